@@ -7,11 +7,13 @@ VENV := .venv
 OLDEST := .venv-oldest
 PY := $(VENV)/bin/python
 PACKAGES := epv_env identification controllers training
-SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile
+SIDE_BY_SIDE := --numprocesses auto --maxprocesses 4 --dist loadfile --no-loadscope-reorder
 
 MAKEFLAGS += --no-print-directory
+# The environments come without bytecode: each of the many processes would compile what it imports anew.
+export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-oldest bench docs lint check format wheel clean
+.PHONY: help venv train test test-slow test-oldest bench docs lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z%-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -50,7 +52,10 @@ train: $(VENV)/.training ## train the PPO controller; options in ARGS="..."
 
 # The matrices are small: threads of the linear algebra and of torch would only wait for each other.
 test: $(VENV)/.installed ## run the tests, files side by side; options in ARGS="..."
-	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(PY) -m pytest $(SIDE_BY_SIDE) $(ARGS)
+	OPENBLAS_NUM_THREADS=1 OMP_NUM_THREADS=1 $(PY) -m pytest $(SIDE_BY_SIDE) -m "not slow" $(ARGS)
+
+test-slow: ## run those of studies, other libraries and simulated devices
+	@$(MAKE) test ARGS='-m slow'
 
 # Its own numba cache: the two numba versions would overwrite each other's files.
 test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the oldest core packages

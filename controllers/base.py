@@ -1,10 +1,25 @@
-"""The protocol of all controllers: observations of a batch in, actions of a batch out."""
+"""The protocol of all controllers, and controllers of one valve that run over a batch of them."""
 
-from typing import Protocol, runtime_checkable
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, ClassVar, Protocol, runtime_checkable
 
+import numba
+import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.observation import CENTRE, SCALE
+from epv_env.plant.primitives import source_digest
 from epv_env.task import LimitingTask
+
+compiled: Callable[..., Any] = numba.njit(error_model="numpy")
+"""Decorator of the functions of one valve."""
+composed: Callable[..., Any] = numba.njit(error_model="numpy", inline="always")
+"""Decorator of those that mainly call others: numba compiles them together with their caller, once."""
+
+# Closed over by the loops: numba's cache on disk notices a change in their own file only.
+DIGEST = source_digest(*Path(__file__).parent.glob("*.py"))
+"""Of all functions that a loop over a batch may call."""
 
 
 class Controller(Protocol):
@@ -34,3 +49,46 @@ class Privileged(Controller, Protocol):
     def watch(self, task: LimitingTask) -> None:
         """Take in the episodes that have just begun; called after the environment's reset."""
         ...
+
+
+class OneValve:
+    """A controller of one valve, over a batch of n.
+
+    Its memory of a valve is a record, whose zeros mean that an episode begins. Its compiled function
+    `decide(memory, observation, constants, period)` changes memory and observation (entries,), and gives
+    the share of the coming period for which the coil is on. An accelerator's kernel calls the same.
+    """
+
+    decide: ClassVar[Any]
+    """The compiled function of one valve."""
+    decide_all: ClassVar[Any]
+    """The same over a batch: (memory, observations, constants, period, shares)."""
+    record: np.dtype
+    """Of a valve's memory."""
+    constants: Any
+    """A named tuple of numbers and arrays that all valves share."""
+    control_period: float
+    """[s]"""
+    memory: Any
+    """Records (n,)."""
+
+    def reset(self, n: int) -> None:
+        """Forget everything; n episodes begin."""
+        self.memory = np.zeros(n, self.record)
+
+    def act(self, observations: NDArray) -> NDArray:
+        """0 (off) or 1 (on) for each valve's observation (n, entries), as (n,)."""
+        return self.shares(observations).astype(int)
+
+    def shares(self, observations: NDArray) -> NDArray:
+        """Share of the coming period with the coil on, for observations (n, entries), as (n,) [1]."""
+        shares = np.empty(len(observations))
+        seen = np.array(observations, dtype=np.float32)
+        type(self).decide_all(self.memory, seen, self.constants, self.control_period, shares)
+        return shares
+
+
+@compiled
+def in_unit(observation, i):
+    """Entry i of an observation (entries,) in its unit."""
+    return observation[i] * SCALE[i] + CENTRE[i]

@@ -1,16 +1,60 @@
 """Two-point control with hysteresis, with or without extrapolation of the measured pressure."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
-from numpy.typing import NDArray
 
+from controllers.base import DIGEST, OneValve, compiled, composed, in_unit
 from controllers.registration import Choice, Range, Registration
-from epv_env.observation import P2_LAGS, decode
+from epv_env.observation import INDEX, P2_LAGS
+
+_ERROR = INDEX["p2_error"]
+
+
+class Thresholds(NamedTuple):
+    """A hysteresis as numbers, for compiled code."""
+
+    open_below: float
+    shut_above: float
+    open_lookahead: float
+    shut_lookahead: float
+    lag: int
+    change: int
+    """Entry of the observation that holds the change over `lag` periods."""
+
+
+@compiled
+def two_points(on, observation, thresholds, period):
+    """Whether the coil shall be on (1 or 0), for an observation (entries,) and whether it is on."""
+    error = in_unit(observation, _ERROR)
+    slope = in_unit(observation, thresholds.change) / (thresholds.lag * period)
+    if on > 0:
+        return 0.0 if error + thresholds.open_lookahead * slope < thresholds.open_below else 1.0
+    return 1.0 if error + thresholds.shut_lookahead * slope > thresholds.shut_above else 0.0
+
+
+@composed
+def decide(m, observation, p, period):
+    """One valve's decision (controllers.base.OneValve)."""
+    m.off = 1.0 - two_points(1.0 - m.off, observation, p, period)
+    return 1.0 - m.off
+
+
+def _loop(digest: str) -> Any:
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def decide_all(memory, observations, p, period, shares):
+        if digest == "":
+            return
+        for i in range(len(memory)):
+            shares[i] = decide(memory[i], observations[i], p, period)
+
+    return decide_all
 
 
 @dataclass(kw_only=True)
-class Hysteresis:
+class Hysteresis(OneValve):
     """Open the protection valve below one threshold of the predicted error, shut it above another.
 
     The prediction is error + lookahead * slope, the slope being the measured change of p2 over `lag`
@@ -31,7 +75,9 @@ class Hysteresis:
     """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
-    _on: NDArray = field(default_factory=lambda: np.ones(0, dtype=np.int64), repr=False)
+    decide = decide
+    decide_all = _loop(DIGEST)
+    record = np.dtype((np.record, [("off", np.float64)]))
 
     def __post_init__(self) -> None:
         if self.lag not in P2_LAGS:
@@ -41,19 +87,10 @@ class Hysteresis:
                 f"open_below = {self.open_below:g} bar exceeds shut_above = {self.shut_above:g} bar: "
                 "a hysteresis needs open_below <= shut_above"
             )
-
-    def reset(self, n: int) -> None:
-        """All coils on, as every episode begins."""
-        self._on = np.ones(n, dtype=np.int64)
-
-    def act(self, observations: NDArray) -> NDArray:
-        """0 (off) or 1 (on) for each valve, (n,)."""
-        error = decode(observations, "p2_error")
-        slope = decode(observations, f"p2_change_{self.lag}") / (self.lag * self.control_period)
-        opens = error + self.open_lookahead * slope < self.open_below
-        shuts = error + self.shut_lookahead * slope > self.shut_above
-        self._on = np.where(self._on == 1, np.where(opens, 0, 1), np.where(shuts, 1, 0))
-        return self._on.copy()
+        self.constants = Thresholds(
+            self.open_below, self.shut_above, self.open_lookahead, self.shut_lookahead,
+            self.lag, INDEX[f"p2_change_{self.lag}"],
+        )  # fmt: skip
 
 
 _THRESHOLDS = {
@@ -70,9 +107,9 @@ HYSTERESIS = Registration(
 """The plain two-point controller."""
 
 EXTRAPOLATING_HYSTERESIS = Registration(
-    kind="hysteresis, extrapolating",
+    kind="extrapolating hysteresis",
     controller=Hysteresis,
-    build=lambda values, plant: Hysteresis(name="hysteresis, extrapolating", **values),
+    build=lambda values, plant: Hysteresis(name="extrapolating hysteresis", **values),
     search_space={
         **_THRESHOLDS,
         "open_lookahead": Range(low=0.0, high=0.15, most=0.5),

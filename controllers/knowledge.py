@@ -9,8 +9,8 @@ adaptive pulse (controllers/pulse.py). Two rules keep the coil on, whatever the 
 
 Two shields turn what an ordinary episode shows into what no reading can change:
 
-3. p2 as read lies above the band: coil on. It stands in front of whatever decides, the controller that
-   takes over where sensors fail included.
+3. p2 as read lies above the band: coil on. It comes last (controllers/sensor_check.py), so it overrules
+   whatever decides where sensors fail, too.
 4. p2 as read lies below the band, the supply is high and nothing is under way, since the coil is on and
    the control chamber full: coil off, unless a rule above says on. One period off cannot open the valve.
 
@@ -27,12 +27,12 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from controllers.base import Controller
-from controllers.pulse import PLAN, PulsePlan, plan
-from controllers.pulse_table import compiled, nominal_table
-from controllers.valve_learner import DIGEST, LEARNT, LEAST_HEAD, VALVE, ValveLearner
-from epv_env.observation import INDEX, LAYOUT, SCALE
+from controllers.base import DIGEST, Controller, compiled, composed, in_unit
+from controllers.pulse import follow, nominal_knowledge
+from controllers.valve_learner import LEARNT, LEAST_HEAD, VALVE
+from epv_env.observation import INDEX, LAYOUT
 from epv_env.plant.plantfile import Plant
+from epv_env.plant.primitives import generated
 from epv_env.reward import BAND_BAR
 
 CEILING = 0.2
@@ -47,17 +47,12 @@ HORIZON = 0.1
 """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
 
 
-_ERROR, _ERROR_SCALE = INDEX["p2_error"], SCALE[INDEX["p2_error"]]
+_ERROR = INDEX["p2_error"]
 READINGS = len(LAYOUT)
 """Number of the readings, which come first."""
 _CENTRE, _SCALE, _LIMIT = (
     np.array([getattr(quantity, name) for quantity in LEARNT]) for name in ("centre", "scale", "limit")
 )
-
-
-_FIELDS: Any = VALVE.fields
-_COLUMNS = np.array([_FIELDS[quantity.name][1] // 8 for quantity in LEARNT])
-"""Of the learnt quantities in a record of VALVE, which holds eight bytes for each number."""
 
 
 @compiled
@@ -80,36 +75,51 @@ def would_rise_too_far(v):
     return v.error + v.fall * HORIZON + v.after_period_early > CEILING
 
 
+@compiled
 def above_band(error):
-    """Shield 3: whether p2 - target as read [bar] lies above the band; a number or an array."""
+    """Shield 3: whether p2 - target as read [bar] lies above the band."""
     return error >= BAND_BAR
 
 
-compiled_above_band = compiled(above_band)
-"""The same for one valve in compiled code, and in C."""
-
-
 @compiled
-def below_band(v, error):
-    """Shield 4: whether p2 - target as read [bar] lies below the band, and the valve can be opened."""
-    return error <= -BAND_BAR and v.on > 0 and v.head >= HIGH_HEAD and v.p1 - v.p3 <= FULL
+def below_band(v, observation):
+    """Shield 4: whether p2 as read lies below the band, and the valve is at rest and can be opened."""
+    low = in_unit(observation, _ERROR) <= -BAND_BAR
+    return low and v.on > 0 and v.head >= HIGH_HEAD and v.p1 - v.p3 <= FULL
+
+
+show_learnt: Any = generated(
+    "show_learnt",
+    "v, inputs",
+    "; ".join(f"inputs[{READINGS + k}] = shown(v.{entry.name}, {k})" for k, entry in enumerate(LEARNT)),
+    compiled,
+    shown=shown,
+)
+"""Write the learnt quantities of one valve behind the readings, into inputs (all,) [-]."""
+
+
+@composed
+def describe(v, observation, c, period, inputs):
+    """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
+
+    c: a Knowledge. Returns whether a rule keeps the coil on.
+    """
+    follow(v, observation, c, period)
+    for i in range(READINGS):
+        inputs[i] = observation[i]
+    show_learnt(v, inputs)
+    return cannot_raise(v) or would_rise_too_far(v)
 
 
 def _loop(digest: str) -> Any:
-    """Advice, learnt quantities, rules and shields of a batch of valves."""
-
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, numbers, table, p, period, out, must_shut, must_open):
+    def describe_all(valves, observations, c, period, inputs, must_shut, must_open):
         if digest == "":
             return
         for i in range(len(valves)):
-            plan(valves[i], table, 0, p, period)
-            for k, column in enumerate(_COLUMNS):
-                out[i, READINGS + k] = shown(numbers[i, column], k)
-            error = out[i, _ERROR] * _ERROR_SCALE
-            v = valves[i]
-            must_shut[i] = cannot_raise(v) or would_rise_too_far(v) or compiled_above_band(error)
-            must_open[i] = below_band(v, error) and not must_shut[i]
+            ruled = describe(valves[i], observations[i], c, period, inputs[i])
+            must_shut[i] = ruled or above_band(in_unit(observations[i], _ERROR))
+            must_open[i] = below_band(valves[i], observations[i]) and not ruled
 
     return describe_all
 
@@ -120,25 +130,24 @@ _describe_all = _loop(DIGEST)
 class ValveKnowledge:
     """Observations with the learnt quantities behind the readings, and what the rules forbid."""
 
-    def __init__(self, plant: Plant, *, control_period: float = 5e-3, pulse: PulsePlan = PLAN):
-        """
-        Args:
-            plant: the nominal plant.
-            control_period: [s].
-            pulse: how the advice is planned.
-        """
-        self.learner = ValveLearner(nominal_table(plant), control_period=control_period)
-        self._pulse = pulse
-        self._forced = np.zeros((2, 0), dtype=bool)
+    def __init__(self, plant: Plant, *, control_period: float = 5e-3):
+        """plant: the nominal plant. control_period: [s]."""
+        self._constants, self._period = nominal_knowledge(plant), control_period
+        self.reset(0)
 
     def reset(self, n: int) -> None:
         """Forget the valves; n episodes begin."""
-        self.learner.reset(n)
+        self.valves = np.zeros(n, VALVE)
+        """What is known of each valve, records (n,)."""
         self._forced = np.zeros((2, n), dtype=bool)
+
+    def forget(self, who: NDArray) -> None:
+        """Forget the valves of these episodes, indices (m,): others begin in their place."""
+        self.valves[who] = 0
 
     def observe(self, observations: NDArray) -> NDArray:
         """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
-        return self._described(self.learner.observe(observations), observations, self._forced)
+        return self._described(self.valves, observations, self._forced)
 
     def overruled(self, actions: NDArray) -> NDArray:
         """Actions (n,) as rules and shields leave them, for the observations taken in last."""
@@ -147,20 +156,16 @@ class ValveKnowledge:
 
     def last(self, who: NDArray, observations: NDArray) -> NDArray:
         """What `observe` gives for the last observations (m, entries) of episodes `who` (m,) that end;
-        the learner forgets these valves."""
-        ending = ValveLearner(self.learner.table, control_period=self.learner.control_period)
-        ending.valves = self.learner.valves[who]
-        self.learner.forget(who)
-        unused = np.zeros((2, len(who)), dtype=bool)
-        return self._described(ending.observe(observations), observations, unused)
+        their valves are forgotten."""
+        ending = self.valves[who]
+        self.forget(who)
+        return self._described(ending, observations, np.zeros((2, len(who)), bool))
 
-    def _described(self, valves: Any, observations: NDArray, forced: NDArray) -> NDArray:
-        out = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
-        out[:, :READINGS] = observations
-        table, period = self.learner.table, self.learner.control_period
-        numbers = valves.view(np.float64).reshape(len(valves), VALVE.itemsize // 8)
-        _describe_all(valves, numbers, table, self._pulse, period, out, *forced)
-        return out
+    def _described(self, valves: NDArray, observations: NDArray, forced: NDArray) -> NDArray:
+        inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
+        seen = np.asarray(observations, dtype=np.float32)
+        _describe_all(valves, seen, self._constants, self._period, inputs, *forced)
+        return inputs
 
 
 class LearntObservation(VectorWrapper):
@@ -198,7 +203,7 @@ class LearntObservation(VectorWrapper):
         if mask is None:
             self.knowledge.reset(self.num_envs)
         else:
-            self.knowledge.learner.forget(np.flatnonzero(mask))
+            self.knowledge.forget(np.flatnonzero(mask))
         self._done = np.zeros(self.num_envs, dtype=bool)
         return self.knowledge.observe(observations), infos
 
@@ -208,7 +213,7 @@ class LearntObservation(VectorWrapper):
             actions = self.knowledge.overruled(actions)
         observations, rewards, terminated, truncated, infos = self.env.step(actions)
         if self._mode is AutoresetMode.NEXT_STEP:
-            self.knowledge.learner.forget(np.flatnonzero(self._done))
+            self.knowledge.forget(np.flatnonzero(self._done))
         self._done = terminated | truncated
         ended = np.flatnonzero(self._done)
         if self._mode is AutoresetMode.SAME_STEP and len(ended):
@@ -218,7 +223,7 @@ class LearntObservation(VectorWrapper):
         return self.knowledge.observe(observations), rewards, terminated, truncated, infos
 
 
-WITH_RULES = ", with rules"
+WITH_RULES = " with rules"
 """Follows the name of a controller that stands behind the rules."""
 
 

@@ -1,66 +1,103 @@
 """A learned policy as a controller: readings and learnt quantities in, a coil's state out.
 
 The policy is a small net without memory. Its output is added to the advice of the adaptive pulse, and
-rules and shields stand in front of it (controllers/knowledge.py). The controller believes p3, so it
-comes with a check of that sensor (controllers/p3_check.py).
+rules and shields stand in front of it (controllers/knowledge.py). The controller believes its readings, so the
+check of the sensors comes first (controllers/sensor_check.py).
 """
 
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
+from typing import Any, NamedTuple
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.knowledge import ValveKnowledge
-from controllers.p3_check import P3Check
-from controllers.policy_files import Network, read_policy
+from controllers.base import DIGEST, OneValve, composed
+from controllers.hysteresis import Hysteresis, Thresholds
+from controllers.knowledge import READINGS, below_band, describe
+from controllers.network import Network, Weights, forward
+from controllers.policy_files import read_policy
+from controllers.pulse import Knowledge, nominal_knowledge
+from controllers.sensor_check import SENSES, Ends, checked, ends_of, overruled
 from controllers.tuned import tuned
+from controllers.valve_learner import LEARNT, VALVE
 from epv_env.plant.plantfile import Plant, load_plant
 
 TRAINED = Path(__file__).parent / "trained"
 """The policy that comes with the package."""
-FALLBACK = "hysteresis, extrapolating"
-"""Takes over where p3 is implausible: the best of the controllers that do not read it."""
+FALLBACK = "extrapolating hysteresis"
+"""Takes over where sensors fail: the best of the controllers that do not read p3."""
+
+
+class Parts(NamedTuple):
+    """What all valves of a policy share, for compiled code."""
+
+    ends: Ends
+    fallback: Thresholds
+    knowledge: Knowledge
+    weights: Weights
+
+
+@composed
+def decide(m, observation, c, period):
+    """One valve's decision (controllers.base.OneValve). c: Parts."""
+    checked(m.senses, observation, c.ends, c.fallback, period)
+    must_shut = describe(m.valve, observation, c.knowledge, period, m.inputs)
+    forward(c.weights, m.inputs, m.signals)
+    off = m.signals[0, 0] >= m.signals[0, 1] or below_band(m.valve, observation)
+    return overruled(m.senses, 0.0 if off and not must_shut else 1.0)
+
+
+def _loop(digest: str) -> Any:
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def decide_all(memory, observations, c, period, shares):
+        if digest == "":
+            return
+        for i in range(len(memory)):
+            shares[i] = decide(memory[i], observations[i], c, period)
+
+    return decide_all
 
 
 @dataclass(kw_only=True)
-class Policy:
-    """The network behind the rules."""
+class Policy(OneValve):
+    """The network behind the rules, and the check of the sensors before both."""
 
     network: Network
     plant: Plant = field(repr=False)
-    """The nominal plant, from which the valve learner starts."""
+    """The nominal plant, from which the valve learner starts; its sensors are checked."""
     control_period: float = 5e-3
     """[s]"""
     name: str = "PPO"
     environment: str = "EPValve-v0"
-    knowledge: ValveKnowledge = field(init=False, repr=False)
+    decide = decide
+    decide_all = _loop(DIGEST)
 
     def __post_init__(self) -> None:
-        self.knowledge = ValveKnowledge(self.plant, control_period=self.control_period)
+        fallback = tuned(FALLBACK, self.plant)
+        assert isinstance(fallback, Hysteresis)
+        signals = self.network.signals
+        self.record = np.dtype((np.record, [
+            ("senses", SENSES), ("valve", VALVE),
+            ("inputs", np.float32, (READINGS + len(LEARNT),)), ("signals", signals.dtype, signals.shape),
+        ]))  # fmt: skip
+        self.constants = Parts(
+            ends_of(self.plant.sensors), fallback.constants, nominal_knowledge(self.plant),
+            self.network.weights,
+        )  # fmt: skip
 
-    def reset(self, n: int) -> None:
-        """Forget the valves; n episodes begin."""
-        self.knowledge.reset(n)
-
-    def act(self, observations: NDArray) -> NDArray:
-        """0 (off) or 1 (on) for each valve, (n,)."""
-        inputs = self.knowledge.observe(observations)
-        off, on = self.network.logits(inputs).T
-        return self.knowledge.overruled(np.where(off >= on, 0, 1))
-
-
-def p3_checked(controller: Policy, plant: Plant) -> P3Check:
-    """The controller with a check of its sensors, the best one that does not read p3 behind it."""
-    fallback = tuned(FALLBACK, plant)
-    return P3Check(main=controller, fallback=fallback, sensors=plant.sensors, name=controller.name)
+    @property
+    def failed(self) -> NDArray:
+        """Whether p3 was implausible or readings were lost since the reset, bool (n,)."""
+        return self.memory["senses"]["failed"] > 0
 
 
 def load_policy(
     folder: str | PathLike[str] = TRAINED, plant: Plant | str | PathLike[str] | None = None
-) -> P3Check:
-    """The whole controller from a policy's folder: network, learner, rules, and the check of p3.
+) -> Policy:
+    """The whole controller from a policy's folder: network, learner, rules, and the check of sensors.
 
     Args:
         folder: with policy.json and policy.safetensors; default: the package's own policy.
@@ -69,5 +106,5 @@ def load_policy(
     Raises PolicyError or PlantFileError if a file cannot be used.
     """
     contract, network = read_policy(folder)
-    chosen = load_plant(plant)
-    return p3_checked(Policy(network=network, plant=chosen, name=contract.name), chosen)
+    period = contract.observation.control_period_s
+    return Policy(network=network, plant=load_plant(plant), name=contract.name, control_period=period)

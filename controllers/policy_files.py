@@ -4,19 +4,18 @@ Loading a policy runs no code from its files: the weights are arrays, the contra
 """
 
 import json
-from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import msgspec
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
 from controllers.knowledge import RULES
+from controllers.network import Network
 from controllers.valve_learner import LEARNT
 from epv_env.common.files import JSONFileError, digest, read_bytes, read_json, write_bytes, write_json
 from epv_env.observation import LAYOUT, contract
@@ -71,67 +70,6 @@ class PolicyContract(msgspec.Struct, kw_only=True):
     """What the network's outputs mean, for readers."""
     provenance: dict[str, Any] = {}
     """Of the training, free-form."""
-
-
-@numba.njit(cache=True, nogil=True)
-def _sums(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    """bias + signal @ weight, added in the order of the inputs; weight: (inputs, outputs).
-
-    The products of a linear algebra library are summed in blocks that depend on the number of rows: the
-    same episode could end differently in a larger batch, or on another machine.
-    """
-    inputs, outputs = weight.shape
-    out = np.empty((len(signal), outputs), signal.dtype)
-    for row in range(len(signal)):
-        for j in range(outputs):
-            out[row, j] = bias[j]
-        for i in range(inputs % 4):  # the inner loop runs over outputs: a CPU can vectorise it
-            for j in range(outputs):
-                out[row, j] += signal[row, i] * weight[i, j]
-        for i in range(inputs % 4, inputs, 4):  # four inputs at a time: fewer reads of the output row
-            a, b, c, d = signal[row, i], signal[row, i + 1], signal[row, i + 2], signal[row, i + 3]
-            for j in range(outputs):
-                total = out[row, j] + a * weight[i, j]
-                total = total + b * weight[i + 1, j]
-                total = total + c * weight[i + 2, j]
-                out[row, j] = total + d * weight[i + 3, j]
-    return out
-
-
-def dense_layer(signal: NDArray, weight: NDArray, bias: NDArray) -> NDArray:
-    """signal @ weight.T + bias.
-
-    Args:
-        signal: (n, inputs).
-        weight: (outputs, inputs), of the signal's precision.
-        bias: (outputs,), of the signal's precision.
-
-    Returns:
-        (n, outputs), of the same precision, in which the sums are also taken.
-    """
-    return _sums(np.ascontiguousarray(signal), np.ascontiguousarray(weight.T), bias)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Network:
-    """A multilayer perceptron with tanh layers, and the weight of the advice beside it."""
-
-    layers: list[tuple[NDArray, NDArray]]
-    """Weight (outputs, inputs) and bias (outputs,) of each layer; the last gives two logits."""
-    advice_weight: NDArray
-    """Weights (2,) of the advice, the last of the inputs (-1: off, 1: on), in the logits."""
-
-    def __repr__(self) -> str:
-        widths = [self.layers[0][0].shape[1], *(len(bias) for _, bias in self.layers)]
-        return f"Network({' x '.join(map(str, widths))}, {self.advice_weight.dtype})"
-
-    def logits(self, inputs: NDArray) -> NDArray:
-        """Logits (n, 2) of coil off and coil on; inputs: readings and learnt quantities (n, all)."""
-        signal = inputs.astype(self.layers[0][0].dtype)
-        advice = signal[:, -1:]
-        for weight, bias in self.layers[:-1]:
-            signal = np.tanh(dense_layer(signal, weight, bias))
-        return dense_layer(signal, *self.layers[-1]) + advice * self.advice_weight
 
 
 def learnt_contract() -> list[dict[str, Any]]:

@@ -11,6 +11,7 @@ corrections: a pulse aims lower by what is uncertain about its rise, and p2 is h
 valve is slow to open.
 """
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
@@ -19,9 +20,10 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.pulse_table import compiled, duration, nominal_table, pulse_tables
+from controllers.base import DIGEST, OneValve, compiled, composed
+from controllers.pulse_table import PulseTable, duration, nominal_table, pulse_tables
 from controllers.registration import Range, Registration
-from controllers.valve_learner import DIGEST, FILTER_TIME, LEAST_HEAD, ValveLearner
+from controllers.valve_learner import FILTER_TIME, LEAST_HEAD, VALVE, begin, observe
 from epv_env.plant.plantfile import Plant
 from epv_env.task import LimitingTask
 
@@ -74,24 +76,62 @@ def plan(v: Any, table: Any, t: int, p: Any, period: float) -> None:
     v.advised = 1.0 if not fed or v.remaining < p.rounding * period else 0.0
 
 
-def _loop(digest: str) -> Any:
-    """`plan` over a batch of valves."""
+class Knowledge(NamedTuple):
+    """What a pulse controller goes by, for compiled code."""
 
+    table: PulseTable
+    plan: PulsePlan
+    filter_time: float
+    informed: bool
+    """Whether the table is of each valve's own plant."""
+
+
+def nominal_knowledge(plant: Plant) -> Knowledge:
+    """Of the adaptive pulse that advises a policy of this nominal plant."""
+    return Knowledge(nominal_table(plant), PLAN, FILTER_TIME, False)
+
+
+@composed
+def follow(v, observation, c, period):
+    """Learn from one valve's observation (entries,), and plan. c: a Knowledge."""
+    if v.begun == 0:
+        begin(v, c.informed)
+    total = 0.0
+    for entry in observation:
+        total += entry
+    if math.isfinite(total):  # of what is not finite nothing is learnt
+        observe(v, c.table, int(v.plant), observation, period, c.filter_time, c.informed)
+    plan(v, c.table, int(v.plant), c.plan, period)
+
+
+@composed
+def decide(v, observation, c, period):
+    """One valve's decision (controllers.base.OneValve)."""
+    follow(v, observation, c, period)
+    return v.advised
+
+
+def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def plan_all(valves, table, own_tables, p, period):
+    def decide_all(memory, observations, c, period, shares):
         if digest == "":
             return
-        for i in range(len(valves)):
-            plan(valves[i], table, i if own_tables else 0, p, period)
+        for i in range(len(memory)):
+            shares[i] = decide(memory[i], observations[i], c, period)
 
-    return plan_all
+    return decide_all
 
 
-plan_all = _loop(DIGEST)
+class _Pulse(OneValve):
+    """Acts as `plan` advises."""
+
+    decide = decide
+    decide_all = _loop(DIGEST)
+    record = VALVE
 
 
 @dataclass(kw_only=True)
-class AdaptivePulse:
+class AdaptivePulse(_Pulse):
     """Acts as `plan` advises, on what it learns about each valve from the valve's own pulses."""
 
     plant: Plant = field(repr=False)
@@ -102,9 +142,8 @@ class AdaptivePulse:
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
     control_period: float = 5e-3
     """[s]"""
-    name: str = "pulse, adaptive"
+    name: str = "adaptive pulse"
     environment: str = "EPValve-v0"
-    learner: ValveLearner = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         if self.pulse.trigger >= self.pulse.aim:
@@ -112,23 +151,11 @@ class AdaptivePulse:
                 f"trigger = {self.pulse.trigger:g} bar is not below aim = {self.pulse.aim:g} bar: a "
                 "pulse only adds pressure, give trigger < aim"
             )
-        self.learner = ValveLearner(
-            nominal_table(self.plant), control_period=self.control_period, filter_time=self.filter_time
-        )
-
-    def reset(self, n: int) -> None:
-        """Forget consumption and valves; n episodes begin."""
-        self.learner.reset(n)
-
-    def act(self, observations: NDArray) -> NDArray:
-        """0 (off) or 1 (on) for each valve, (n,)."""
-        valves = self.learner.observe(observations)
-        plan_all(valves, self.learner.table, False, self.pulse, self.control_period)
-        return valves["advised"].astype(int)
+        self.constants = Knowledge(nominal_table(self.plant), self.pulse, self.filter_time, False)
 
 
 @dataclass(kw_only=True)
-class InformedPulse:
+class InformedPulse(_Pulse):
     """The same with each valve's own parameters, which no ECU knows: what knowing them is worth.
 
     It measures the state as the other controllers do and has no foresight.
@@ -138,12 +165,8 @@ class InformedPulse:
     """How pulses are planned."""
     filter_time: float = 0.0125
     """Time in which the weight of a reading of p2 fades by 1/e [s]."""
-    name: str = "pulse, informed"
+    name: str = "informed pulse"
     environment: str = "EPValve-v0"
-    _learner: ValveLearner | None = field(default=None, repr=False)
-
-    def reset(self, n: int) -> None:
-        """Nothing to forget: `watch` begins each batch anew."""
 
     def watch(self, task: LimitingTask) -> None:
         """Make the tables of the episodes that have just begun (controllers.base.Privileged).
@@ -152,21 +175,19 @@ class InformedPulse:
         """
         plants = [parameters for parameters in task.parameters if parameters is not None]
         assert len(plants) == task.n, "the episodes must have begun"
-        self._learner = ValveLearner(
-            pulse_tables(plants, task.settings.supply_voltage), informed=True,
-            control_period=task.period, filter_time=self.filter_time,
-        )  # fmt: skip
-        self._learner.reset(task.n)
+        tables = pulse_tables(plants, task.settings.supply_voltage)
+        self.constants = Knowledge(tables, self.pulse, self.filter_time, True)
+        self.control_period = task.period
+        self.reset(task.n)
+        self.memory["plant"] = np.arange(task.n)
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve, (n,). Raises ValueError if no task is watched."""
-        if self._learner is None:
+        if not hasattr(self, "constants"):
             raise ValueError(
                 "the informed pulse controller sees no task: call watch(env.task) after the reset"
             )
-        valves = self._learner.observe(observations)
-        plan_all(valves, self._learner.table, True, self.pulse, self._learner.control_period)
-        return valves["advised"].astype(int)
+        return super().act(observations)
 
 
 def _adaptive(values: Mapping[str, Any], plant: Plant) -> AdaptivePulse:
@@ -176,7 +197,7 @@ def _adaptive(values: Mapping[str, Any], plant: Plant) -> AdaptivePulse:
 
 
 ADAPTIVE_PULSE = Registration(
-    kind="pulse, adaptive",
+    kind="adaptive pulse",
     controller=AdaptivePulse,
     build=_adaptive,
     search_space={
@@ -191,7 +212,7 @@ ADAPTIVE_PULSE = Registration(
 )
 
 INFORMED_PULSE = Registration(
-    kind="pulse, informed",
+    kind="informed pulse",
     controller=InformedPulse,
     build=lambda values, plant: InformedPulse(),
     search_space=None,

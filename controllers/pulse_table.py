@@ -10,15 +10,15 @@ off. Some ten thousand short simulations of the plant in one batch make the tabl
 All functions that are compiled take numbers in bar and seconds, so that they can be translated to C.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
+from controllers.base import compiled
 from epv_env.common.units import BAR, GRAM, MILLISECOND
 from epv_env.plant.consumption import SCENARIOS
 from epv_env.plant.equations import State
@@ -26,9 +26,6 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.primitives import CRITICAL_RATIO, QUARTER_PI, bracket_over_drop
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-
-compiled: Callable[..., Any] = numba.njit(error_model="numpy")
-"""Decorator of the functions of one valve."""
 
 SUPPLY = np.array([7.0, 11.0, 15.0])
 """Nodes of p1 [bar]; beyond the ends of an axis its end holds."""

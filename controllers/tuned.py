@@ -15,9 +15,6 @@ FORMAT = "epv-controllers/1"
 TUNED_FILE = Path(__file__).parent / "tuned.json"
 """The tunings that come with the package."""
 
-ABLATED = ("hysteresis, extrapolating", "pulse, adaptive")
-"""Kinds that stand in tables behind the rules, too."""
-
 
 class ControllersFileError(ValueError):
     """A file of tuned controllers cannot be used."""
@@ -103,8 +100,3 @@ def tuned(name: str, plant: Plant | None = None) -> Controller:
 def tuned_controllers(plant: Plant | None = None) -> list[Controller]:
     """The classic controllers as tuned, designed for a plant (None: the report's calibration)."""
     return [tuned(name, plant) for name in load_tunings()]
-
-
-def ablation(plant: Plant | None = None) -> list[Controller]:
-    """Classic controllers behind the rules of the learned policy: what learning adds to them."""
-    return [tuned(name + WITH_RULES, plant) for name in ABLATED]

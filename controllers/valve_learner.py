@@ -14,22 +14,13 @@ The compiled functions work on one valve with plain arithmetic, so that they can
 """
 
 import math
-from pathlib import Path
 from typing import Any
 
-import numba
 import numpy as np
-from numpy.typing import NDArray
 
-from controllers.pulse_table import (
-    PulseTable,
-    compiled,
-    gained_at_once,
-    opens_at,
-    time_to_open,
-)
-from epv_env.observation import CENTRE, INDEX, SCALE, Quantity
-from epv_env.plant.primitives import source_digest
+from controllers.base import compiled, in_unit
+from controllers.pulse_table import gained_at_once, opens_at, time_to_open
+from epv_env.observation import INDEX, Quantity
 from epv_env.reward import BAND_BAR
 
 OFFSETS = np.linspace(-2.2, 2.2, 45)
@@ -79,7 +70,7 @@ FILTER_TIME = 0.025
 """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
 _STATE = (
-    "off_periods", "on_periods", "was_shut", "slope", "pace_variance", "measuring",
+    "begun", "plant", "off_periods", "on_periods", "was_shut", "slope", "pace_variance", "measuring",
     "end_p1", "end_p2", "end_p3", "end_fall", "reached",
 )  # fmt: skip
 
@@ -116,7 +107,7 @@ def _learnt() -> tuple[Quantity, ...]:
 LEARNT = _learnt()
 """What is known of a valve, as a policy sees it; the advice last."""
 
-VALVE = np.dtype(
+VALVE = np.dtype((np.record,
     [
         (name, np.float64)
         for name in (
@@ -128,8 +119,9 @@ VALVE = np.dtype(
         )
     ]
     + [(name, np.float64, (MEMBERS,)) for name in ("probability", "member_gain", "member_variance")]
-)  # fmt: skip
-"""State of a learner and what it knows of one valve."""
+))  # fmt: skip
+"""State of a learner and what it knows of one valve; zeros: an episode begins. plant: its place in
+the table."""
 
 _ERROR, _TARGET, _P1, _P3, _COIL, _P2_CHANGE, _P3_CHANGE = (
     INDEX[name] for name in ("p2_error", "target", "p1", "p3", "action", "p2_change_1", "p3_change_1")
@@ -137,10 +129,9 @@ _ERROR, _TARGET, _P1, _P3, _COIL, _P2_CHANGE, _P3_CHANGE = (
 
 
 @compiled
-def begin(v):
-    """Nothing is known of the valve: an episode begins."""
-    v.off_periods = v.on_periods = v.was_shut = v.slope = v.measuring = v.reached = 0.0
-    v.error = v.deepest = 0.0
+def begin(v, informed):
+    """An episode begins: nothing is known of the valve, or all of it where the table is its own."""
+    v.begun = 1.0
     v.pace, v.pace_variance = 1.0, PACE_SPREAD**2
     total = 0.0
     for m in range(MEMBERS):
@@ -150,15 +141,10 @@ def begin(v):
         v.probability[m] /= total
         v.member_gain[m], v.member_variance[m] = 1.0, GAIN_SPREAD**2
     summarise(v)
-
-
-@compiled
-def begin_informed(v):
-    """The table is the valve's own: nothing has to be learnt."""
-    begin(v)
-    v.pace_variance = 0.0
-    v.offset = v.offset_deviation = v.early_offset = v.gain_deviation = 0.0
-    v.gain = 1.0
+    if informed:
+        v.pace_variance = 0.0
+        v.offset = v.offset_deviation = v.early_offset = v.gain_deviation = 0.0
+        v.gain = 1.0
 
 
 @compiled
@@ -311,12 +297,11 @@ def observe(
     the weight of a reading of p2 fades by 1/e [s]. informed: whether the table is the valve's own, so
     that nothing is learnt of the valve.
     """
-    error = reading[_ERROR] * SCALE[_ERROR] + CENTRE[_ERROR]
-    p1 = reading[_P1] * SCALE[_P1] + CENTRE[_P1]
-    p2 = error + reading[_TARGET] * SCALE[_TARGET] + CENTRE[_TARGET]
-    p3 = reading[_P3] * SCALE[_P3] + CENTRE[_P3]
-    p2_change = reading[_P2_CHANGE] * SCALE[_P2_CHANGE] + CENTRE[_P2_CHANGE]
-    p3_change = reading[_P3_CHANGE] * SCALE[_P3_CHANGE] + CENTRE[_P3_CHANGE]
+    if v.begun == 0:
+        begin(v, informed)
+    error, p1, p3 = in_unit(reading, _ERROR), in_unit(reading, _P1), in_unit(reading, _P3)
+    p2 = error + in_unit(reading, _TARGET)
+    p2_change, p3_change = in_unit(reading, _P2_CHANGE), in_unit(reading, _P3_CHANGE)
     on = reading[_COIL] > 0.0
     if on and v.off_periods > 0:  # the pulse ended at the last reading
         v.end_p1, v.end_p2, v.end_p3, v.end_fall = v.p1, v.p2, v.p3, v.fall
@@ -344,79 +329,3 @@ def observe(
     v.pace_deviation = math.sqrt(v.pace_variance)
     foresee(v, table, t, p1, p2, p3, period)
     remember_breakdown(v, period)
-
-
-# Closed over by the loops: numba's cache on disk notices a change in their own file only.
-DIGEST = source_digest(*Path(__file__).parent.glob("*.py"))
-
-
-def _loops(digest: str) -> tuple[Any, Any]:
-    """The functions over a batch of valves."""
-
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def begin_all(valves, who, informed):
-        if digest == "":
-            return
-        for i in who:
-            if informed:
-                begin_informed(valves[i])
-            else:
-                begin(valves[i])
-
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def observe_all(valves, table, observations, period, filter_time, informed):
-        if digest == "":
-            return
-        for i in range(len(valves)):
-            if not np.isfinite(observations[i].sum()):
-                continue  # of what is not finite nothing is learnt
-            t = i if informed else 0
-            observe(valves[i], table, t, observations[i], period, filter_time, informed)
-
-    return begin_all, observe_all
-
-
-_begin_all, _observe_all = _loops(DIGEST)
-
-
-class ValveLearner:
-    """Follows n valves from their observations and learns what they are."""
-
-    def __init__(
-        self,
-        table: PulseTable,
-        *,
-        control_period: float = 5e-3,
-        filter_time: float = FILTER_TIME,
-        informed: bool = False,
-    ):
-        """
-        Args:
-            table: of the nominal plant; of each valve's own plant if `informed`.
-            control_period: [s].
-            filter_time: time in which the weight of a reading of p2 fades by 1/e [s].
-            informed: whether the table is of each valve's own plant, so that nothing has to be learnt.
-        """
-        self.table = table
-        self.control_period = control_period
-        self._filter_time = filter_time
-        self._informed = informed
-        self.reset(0)
-
-    def reset(self, n: int) -> None:
-        """Forget consumption and valves; n episodes begin."""
-        self.valves: Any = np.zeros(n, VALVE)
-        """What is known of each valve, records of VALVE (n,)."""
-        self.forget(np.arange(n))
-
-    def forget(self, who: NDArray) -> None:
-        """Forget consumption and valve of these episodes, indices (m,): others begin in their place."""
-        _begin_all(self.valves, who, self._informed)
-
-    def observe(self, observations: NDArray) -> Any:
-        """Take in observations (n, entries); what is known then, records of VALVE (n,)."""
-        _observe_all(
-            self.valves, self.table, np.ascontiguousarray(observations, dtype=np.float64),
-            self.control_period, self._filter_time, self._informed,
-        )  # fmt: skip
-        return self.valves

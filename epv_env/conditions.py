@@ -2,107 +2,76 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
-from typing import Any
+from typing import Annotated, Any
 
 from epv_env.common.field_types import shown
-from epv_env.signals import (
-    PRESSURE_LIMITS_BAR,
-    OptionError,
-    Range,
-    as_number,
-    as_range,
-    check_count,
-    check_known,
-)
+from epv_env.signals import OptionError, Range, check_count, check_known, check_limits
 
-PROBABILITIES = (
-    "starved", "far", "vented", "coil_off", "rest", "target_steps", "noisy", "frozen_p3", "worn",
-    "biased_p2", "delayed", "extreme", "braking",
-)  # fmt: skip
-"""Fields of Conditions that are probabilities, in the order in which the conditions act."""
-
-_LIMITS: dict[str, Range] = {
-    "vented_drop_bar": (0.0, PRESSURE_LIMITS_BAR[1]),
-    "rest_s": (0.1, 3600.0),
-    "target_step_s": (0.01, 3600.0),
-    "target_step_bar": (-5.0, 5.0),
-    "starved_bar": (-5.0, 5.0),
-    "starved_s": (0.0, 3600.0),
-    "noise_factor": (0.0, 1000.0),
-    "frozen_p3_s": (0.0, 3600.0),
-    "bias_p2_bar": (-1.0, 1.0),
-    "delay_ms": (0.0, 10.0),
-}
-"""What the ranges may hold."""
+Probability = Annotated[float, (0.0, 1.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Conditions:
     """Probabilities of an episode, each drawn on its own, and the ranges of what is then drawn.
 
-    Ranges are uniform unless their field says otherwise. All probabilities are 0 by default: the
-    ordinary episode, to the bit.
+    The conditions act in the order of their probabilities. Ranges are uniform unless their field says
+    otherwise. All probabilities are 0 by default: the ordinary episode, to the bit.
     """
 
-    far: float = 0.0
+    starved: Probability = 0.0
+    """Probability that the supply begins near or below the target and is refilled later."""
+    starved_bar: Annotated[Range, (-5.0, 5.0)] = (-0.5, 1.5)
+    """How far this supply begins below the target [bar]; below 0 it begins above."""
+    starved_s: Annotated[Range, (0.0, 3600.0)] = (0.5, 4.0)
+    """When its refill begins [s]; it lasts less than a second."""
+    far: Probability = 0.0
     """Probability that the circuit begins anywhere between almost empty and full: a first filling."""
-    least_p2_bar: float = 1.6
+    least_p2_bar: Annotated[float, (1.51, 16.0)] = 1.6
     """Emptiest circuit with which an episode begins [bar]; at 1.5 the episode would have failed."""
-    vented: float = 0.0
+    vented: Probability = 0.0
     """Probability that the coil has been off for long: the control chamber is empty, the valve open."""
-    vented_drop_bar: Range = (3.0, 4.4)
+    vented_drop_bar: Annotated[Range, (0.0, 16.0)] = (3.0, 4.4)
     """How far a vented valve's circuit begins below the target [bar]: the valve shuts so late that from
     less than 3 bar the overshoot could not be avoided."""
-    coil_off: float = 0.0
+    coil_off: Probability = 0.0
     """Probability that the magnet valve begins released, over a filled control chamber: a restart."""
-    rest: float = 0.0
+    rest: Probability = 0.0
     """Probability that the first application comes later, as while a vehicle rolls."""
-    rest_s: Range = (2.0, 120.0)
+    rest_s: Annotated[Range, (0.1, 3600.0)] = (2.0, 120.0)
     """How much later [s], log-uniform: short rests are common, and cheap to simulate."""
-    target_steps: float = 0.0
+    target_steps: Probability = 0.0
     """Probability that the target steps, four times at most."""
-    target_step_s: Range = (1.0, 4.0)
+    target_step_s: Annotated[Range, (0.01, 3600.0)] = (1.0, 4.0)
     """Time from one step to the next [s]."""
-    target_step_bar: Range = (0.1, 0.5)
+    target_step_bar: Annotated[Range, (-5.0, 5.0)] = (0.1, 0.5)
     """Height of a step [bar]; below 0 it falls, which only consumption lets the circuit follow."""
-    starved: float = 0.0
-    """Probability that the supply begins near or below the target and is refilled later."""
-    starved_bar: Range = (-0.5, 1.5)
-    """How far this supply begins below the target [bar]; below 0 it begins above."""
-    starved_s: Range = (0.5, 4.0)
-    """When its refill begins [s]; it lasts less than a second."""
-    noisy: float = 0.0
+    noisy: Probability = 0.0
     """Probability that the sensors' noise has another size."""
-    noise_factor: Range = (0.0, 4.0)
+    noise_factor: Annotated[Range, (0.0, 1000.0)] = (0.0, 4.0)
     """Factor of `sensor_noise` [-], from a clean reading to four times Table 3's."""
-    frozen_p3: float = 0.0
+    frozen_p3: Probability = 0.0
     """Probability that the reading of p3 stops changing."""
-    frozen_p3_s: Range = (0.5, 8.0)
+    frozen_p3_s: Annotated[Range, (0.0, 3600.0)] = (0.5, 8.0)
     """When it stops [s]."""
-    biased_p2: float = 0.0
-    """Probability that the reading of p2 is off."""
-    bias_p2_bar: Range = (-0.256, 0.256)
-    """By how much [bar]; Table 1 allows 1.6 % of 16 bar."""
-    delayed: float = 0.0
-    """Probability that the coil follows its command late."""
-    delay_ms: Range = (0.0, 5.0)
-    """How late [ms]; the catalogue's typical delay is below 2, a slow network's is 5."""
-    worn: float = 0.0
+    worn: Probability = 0.0
     """Probability that the valve has effects of the catalogue, up to their typical sizes."""
-    extreme: float = 0.0
-    """Probability that the plant lies near a corner of its region: rare valves become common."""
-    braking: float = 0.0
-    """Probability that the consumption is that of emergencies, the hardest."""
     most_effects: int = 3
-    """How many at most; their number is uniform. A worn valve has more than one fault."""
+    """How many effects at most; their number is uniform. A worn valve has more than one fault."""
+    biased_p2: Probability = 0.0
+    """Probability that the reading of p2 is off."""
+    bias_p2_bar: Annotated[Range, (-1.0, 1.0)] = (-0.256, 0.256)
+    """By how much [bar]; Table 1 allows 1.6 % of 16 bar."""
+    delayed: Probability = 0.0
+    """Probability that the coil follows its command late."""
+    delay_ms: Annotated[Range, (0.0, 10.0)] = (0.0, 5.0)
+    """How late [ms]; the catalogue's typical delay is below 2, a slow network's is 5."""
+    extreme: Probability = 0.0
+    """Probability that the plant lies near a corner of its region: rare valves become common."""
+    braking: Probability = 0.0
+    """Probability that the consumption is that of emergencies, the hardest."""
 
     def __post_init__(self) -> None:
-        for name in PROBABILITIES:
-            as_number(f"conditions: {name}", getattr(self, name), (0.0, 1.0))
-        as_number("conditions: least_p2_bar", self.least_p2_bar, (1.51, PRESSURE_LIMITS_BAR[1]))
-        for name, limits in _LIMITS.items():
-            ends = as_range(f"conditions: {name}", getattr(self, name), limits)
-            object.__setattr__(self, name, ends)  # a number stands for a range of that value
+        check_limits(self, "conditions: ")
         check_count("conditions: most_effects", self.most_effects, most=10)
 
     @property
@@ -110,6 +79,9 @@ class Conditions:
         """Whether nothing can happen."""
         return not any(getattr(self, name) for name in PROBABILITIES)
 
+
+PROBABILITIES = tuple(entry.name for entry in fields(Conditions) if entry.type == Probability)
+"""Fields of Conditions that are probabilities, in the order in which the conditions act."""
 
 CONDITIONS: dict[str, Conditions] = {
     "ordinary": Conditions(),

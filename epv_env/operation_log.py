@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.files import write_json, write_text
+from epv_env.common.results_folder import LOCK_FILE
 from epv_env.common.units import BAR
 from epv_env.env import EPValveEnv
 from epv_env.observation import INDEX, decode
@@ -36,7 +37,7 @@ class OperationLog(gymnasium.Wrapper[NDArray, Any, NDArray, Any]):
     """
 
     def __init__(self, env: gymnasium.Env[NDArray, Any], folder: str | PathLike[str], name: str = ""):
-        """folder: must not exist or be empty. name: of the valve, None for the folder's.
+        """folder: new, or without files. name: of the valve, "" for the folder's.
 
         Raises OptionError for another environment, or a folder that holds files.
         """
@@ -48,7 +49,8 @@ class OperationLog(gymnasium.Wrapper[NDArray, Any, NDArray, Any]):
             )
         self.valve = env.unwrapped
         self.folder = Path(folder)
-        if self.folder.exists() and any(self.folder.iterdir()):
+        there = self.folder.iterdir() if self.folder.exists() else ()
+        if any(path.name != LOCK_FILE for path in there):
             raise OptionError(f"{self.folder} holds files already: give another folder for the log")
         self.name = name or self.folder.resolve().name
         self._rows: list[NDArray] = []

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property
 from os import PathLike
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from epv_env.signals import (
     as_number,
     as_range,
     check_known,
+    check_limits,
     shown,
 )
 
@@ -143,14 +144,6 @@ def as_effects(value: Any) -> dict[str, Any]:
     return sizes
 
 
-NUMBERS: dict[str, Range] = {
-    "control_period": (0.5e-3, 0.1),
-    "supply_voltage": (0.1, 32.0),  # Table 1
-    "settling_time": (0.0, 3600.0),
-    "sensor_noise": (0.0, 1000.0),  # beyond, every reading is at an end of its range
-}
-"""Fields of Settings that are numbers, and their ranges [SI]."""
-
 OPTIONS = ("parameters", "effects", "scenario", "supply", "target_bar", "p2_bar", "p3_bar", "conditions")
 """Keys that reset(options=...) understands, beside Gymnasium's "reset_mask"."""
 
@@ -163,7 +156,7 @@ class Settings:
     """From which the plant's parameters are drawn, but the sizes of `effects`."""
     effects: Mapping[str, Any] = field(default_factory=dict)
     """Sizes of effects by symbol, a number or (low, high) [SI]; the others are the region's."""
-    control_period: float
+    control_period: Annotated[float, (0.5e-3, 0.1)]
     """Time between decisions [s]."""
     supply: Supply = field(default_factory=Supply.reservoirs)
     """Supply of the input chamber."""
@@ -171,18 +164,19 @@ class Settings:
     """Consumption: a name, a scenario of one's own, or a recording."""
     target_bar: Range | MovingTarget = (6.0, 9.5)
     """Target pressure [bar absolute]."""
-    p2_bar: Range | None = None
+    p2_bar: Annotated[Range | None, PRESSURE_LIMITS_BAR] = None
     """First circuit pressure; None: `drop_bar` below the target (an excess could not be undone)."""
-    p3_bar: Range | None = None
+    p3_bar: Annotated[Range | None, PRESSURE_LIMITS_BAR] = None
     """First control pressure; None: p1, the energised steady state."""
-    drop_bar: Range = (0.0, 2.0)
+    drop_bar: Annotated[Range, (0.0, 16.0)] = (0.0, 2.0)
     """How far the first circuit pressure lies below the target [bar]."""
-    supply_voltage: float = 24.0
-    """Solenoid voltage when on [V]."""
-    settling_time: float = 0.5
+    supply_voltage: Annotated[float, (0.1, 32.0)] = 24.0
+    """Solenoid voltage when on [V]; up to the sensor's end (Table 1)."""
+    settling_time: Annotated[float, (0.0, 3600.0)] = 0.5
     """Time after which the band of C1 has to hold [s]."""
-    sensor_noise: float = 1.0
-    """Standard deviations of the sensors' noise relative to Table 3's; True is 1, False is 0."""
+    sensor_noise: Annotated[float, (0.0, 1000.0)] = 1.0
+    """Standard deviations of the sensors' noise relative to Table 3's; True is 1, False is 0. Beyond
+    1000, every reading is at an end of its range."""
     weights: RewardWeights = field(default_factory=RewardWeights)
     """Weights of the reward."""
     conditions: Conditions = field(default_factory=Conditions)
@@ -209,10 +203,9 @@ class Settings:
                 "(low, high), or set target_steps to 0"
             )
         assert self.plants  # refuses sizes outside their domains now, not in the first episode
-        for name, limits in NUMBERS.items():
-            value = getattr(self, name)
-            switch = name == "sensor_noise" and isinstance(value, bool)
-            object.__setattr__(self, name, as_number(name, float(value) if switch else value, limits))
+        if isinstance(self.sensor_noise, bool):
+            object.__setattr__(self, "sensor_noise", float(self.sensor_noise))
+        check_limits(self)
         self._check_pressures()
 
     def _check_pressures(self) -> None:
@@ -236,15 +229,13 @@ READERS: dict[str, Callable[[Any], Any]] = {
     "supply": as_supply,
     "scenario": as_scenario,
     "target_bar": as_target,
-    "p2_bar": lambda value: None if value is None else as_range("p2_bar", value),
-    "p3_bar": lambda value: None if value is None else as_range("p3_bar", value),
-    "drop_bar": lambda value: as_range("drop_bar", value, (0.0, 16.0)),
     "conditions": as_conditions,
 }
 """Fields of Settings by what reads them from what a user writes."""
 
 ARGUMENTS = (
-    "plant", "privileged", "render_mode", "parameters", "band_bar", "weights", *READERS, *NUMBERS,
+    "plant", "privileged", "render_mode", "parameters", "band_bar",
+    *(entry.name for entry in fields(Settings) if entry.name != "region"),
 )  # fmt: skip
 """What an environment takes; see `EPValveEnv`."""
 

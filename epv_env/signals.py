@@ -2,7 +2,9 @@
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any, NamedTuple, TypeVar
+from functools import cache
+from types import NoneType
+from typing import Annotated, Any, NamedTuple, TypeVar, get_args, get_origin, get_type_hints
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -78,12 +80,41 @@ def as_range(name: str, value: Any, limits: Range = PRESSURE_LIMITS_BAR) -> Rang
     return low, high
 
 
+def check_limits(settings: Any, where: str = "") -> None:
+    """Check the fields of a dataclass's instance that are annotated with limits, None where it may be.
+
+    A number that stands for a range becomes one. where: begins the name in messages. Raises OptionError.
+    """
+    for name, (kind, limits) in _limits(type(settings)).items():
+        value, read = getattr(settings, name), as_number if kind is float else as_range
+        if value is not None or NoneType not in get_args(kind):
+            object.__setattr__(settings, name, read(where + name, value, limits))
+
+
+@cache
+def _limits(dataclass: type) -> dict[str, Any]:
+    """Type and limits of each field Annotated[type, limits]."""
+    hints = get_type_hints(dataclass, include_extras=True)
+    return {name: get_args(h) for name, h in hints.items() if get_origin(h) is Annotated}
+
+
 LONGEST_SIGNAL = 10_000_000
 """Samples, at most: more is a slip, and would fill the memory."""
 
 
 class SignalError(ValueError):
     """A signal cannot be used: the message says which, the rule and the remedy."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Interpolated:
+    """Linear between samples (samples,), which its text holds; that of a function has an address."""
+
+    time: NDArray
+    samples: NDArray
+
+    def __call__(self, seconds: float) -> float:
+        return float(np.interp(seconds, self.time, self.samples))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,7 +134,7 @@ class MovingTarget:
         time_s: increasing (samples,) [s]. target_bar: (samples,) [bar absolute]. Raises SignalError.
         """
         time, values = _samples("a recorded target", time_s, target_bar)
-        return cls(at=lambda seconds: float(np.interp(seconds, time, values)))
+        return cls(at=_Interpolated(time, values))
 
     def values(self, time: NDArray, limits: tuple[float, float]) -> NDArray:
         """Targets (n,) [bar absolute] at times (n,) [s].

@@ -1,7 +1,7 @@
 """Does the calibrated model hold on recordings it has not seen (section 7)?
 
 The report's errors on the held-out recordings, whether the residuals are white noise, and both as a
-section of the report (Table 15, Figures 14 and 15) and as JSON.
+section of the report (Table 15, Figure 14) and as JSON.
 """
 
 from collections.abc import Sequence
@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from statsmodels.stats.diagnostic import acorr_ljungbox
 from statsmodels.tsa.stattools import acf
@@ -17,17 +16,10 @@ from statsmodels.tsa.stattools import acf
 from epv_env.plant.parameters import Parameters
 from identification.calibration.calibrate import EXPLAINED
 from identification.calibration.problem import CalibrationProblem
-from identification.quality.assessment import white_noise_band
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.replay import Response, responses
-from identification.replay.response_blocks import (
-    error_figure,
-    error_table,
-    errors_as_json,
-    percent,
-    response_figure,
-)
-from identification.report.page import Picture, Section, Table, Verdict
+from identification.replay.response_blocks import error_table, errors_as_json, percent, worst_picture
+from identification.report.page import Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR
 
 GREATEST_LAG = 0.05
@@ -133,15 +125,7 @@ def validation_section(validation: Validation) -> Section:
         blocks=[
             error_table(validation.answers, "Result of the model validation."),
             _residual_table(validation),
-            *(
-                Picture(figure=response_figure(answer), caption="Validation: " + answer.recording.name)
-                for answer in validation.answers[:8]
-            ),
-            Picture(figure=error_figure(validation.answers[:8]), caption="Error over time."),
-            Picture(
-                figure=autocorrelations(validation),
-                caption="Autocorrelation of the residuals; the band holds 95 % of white noise.",
-            ),
+            worst_picture(validation.answers),
         ],
     )
 
@@ -161,28 +145,6 @@ def validation_json(validation: Validation) -> dict[str, Any]:
             for r in validation.residuals
         ],
     }
-
-
-def autocorrelations(validation: Validation) -> Figure:
-    """Autocorrelation of the residuals over the lag, a panel per output."""
-    figure = Figure(figsize=(9, 3.0), layout="constrained")
-    panels = figure.subplots(1, len(OUTPUTS), sharey=True)
-    samples = {a.recording.name: len(a.recording) for a in validation.answers}
-    periods = {a.recording.name: a.recording.period for a in validation.answers}
-    for residual in validation.residuals:
-        axes = panels[OUTPUTS.index(residual.output)]
-        correlation = residual.whiteness.autocorrelation[1:]
-        lags = 1e3 * periods[residual.recording] * np.arange(1, len(correlation) + 1)
-        axes.plot(lags, correlation, linewidth=0.8, label=residual.recording)
-    for axes, output in zip(panels, OUTPUTS, strict=True):
-        band = white_noise_band(min(samples.values()))
-        axes.axhspan(-band, band, color="tab:orange", alpha=0.25, linewidth=0)
-        axes.set_title(output)
-        axes.set_xlabel("lag [ms]")
-        axes.grid(alpha=0.3)
-    panels[0].set_ylabel("autocorrelation")
-    panels[0].legend(fontsize="small")
-    return figure
 
 
 def _error_verdict(validation: Validation) -> Verdict:

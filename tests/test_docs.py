@@ -21,7 +21,8 @@ from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
 from docs.scripts import notebook  # noqa: E402
 from docs.scripts.effects_table import effects_table  # noqa: E402
-from epv_env.common.commands import commands, parse  # noqa: E402
+from epv_env.common.commands import commands  # noqa: E402
+from epv_env.common.options import parse  # noqa: E402
 from epv_env.plant.plantfile import load_plant  # noqa: E402
 from identification.bench.programmes import load_programmes  # noqa: E402
 from identification.importing.mapping_file import read_mapping  # noqa: E402
@@ -141,15 +142,6 @@ def test_make_targets_shown_exist():
             assert target in targets or target.startswith("study-"), f"{page}: make {target}"
 
 
-def test_a_wrong_option_on_a_page_is_found():
-    assert list(shell_commands("A=1 epv run x --out y # why\ncd z && make q")) == [
-        ["epv", "run", "x", "--out", "y"], ["cd", "z"], ["make", "q"],
-    ]  # fmt: skip
-    module, options = command_of(["epv", "run", "--no-such-option"]) or ("", [])
-    with pytest.raises(SystemExit):
-        parse(importlib.import_module(module), module, options)
-
-
 def anchors(page: str) -> set[str]:
     """The names under which the headings of a page can be linked to."""
     headings = re.findall(r"^#+ +(.*)$", FENCE.sub("", text(page)), re.M)
@@ -217,7 +209,6 @@ def test_the_page_of_the_architecture_says_who_imports_whom():
             assert others <= allowed[own], f"{path} imports {others - allowed[own]}"
 
 
-@pytest.mark.slow
 def test_the_site_builds_without_a_warning(tmp_path):
     """A warning fails: a broken link, a page outside the navigation."""
     done = run(sys.executable, "-m", "mkdocs", "build", "--strict", "-d", tmp_path / "site", cwd=ROOT)

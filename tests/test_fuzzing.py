@@ -21,9 +21,9 @@ pytest.importorskip("statsmodels")
 from controllers.monitor import MonitorModel
 from controllers.policy import TRAINED
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, read_policy
-from epv_env.common.command_line import Number
-from epv_env.common.commands import commands, main, parser_of
+from epv_env.common.commands import commands, main
 from epv_env.common.files import Journal
+from epv_env.common.options import Number, parser_of
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from identification.bench.programmes import REPORT_SUITE, load_programmes, save_programmes
 from identification.importing.mapping_file import read_mapping

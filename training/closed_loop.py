@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import spsolve
 
-from controllers.base import Controller, Privileged
+from controllers.base import Controller
 from epv_env.actions import OnOff
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.plantfile import Plant
@@ -25,7 +25,7 @@ from epv_env.signals import MovingTarget, RecordedConsumption
 from identification.gap.diagnosis import Diagnosis
 from identification.recordings.log_files import Drive, Log
 from identification.report.page import Section, Table, Verdict
-from training.monitoring import drives
+from training.drives import check_can_log, drives
 
 SETTLING = 0.5
 """Time of a drive after which p2 counts [s]."""
@@ -158,7 +158,7 @@ def _inputs(drive: Drive, period: float, p: Mapping[str, float]) -> dict[str, An
 
 
 def _read(drive: Drive, rows: NDArray) -> Drive:
-    """The drive with other readings, (samples at least, 6) of `training.monitoring.drives`."""
+    """The drive with other readings, (samples at least, 6) of `training.drives.drives`."""
     coil, u, p1, p2, p3, current = rows[: len(drive.coil)].T
     return replace(drive, coil=coil, U=coil * u, p1=BAR * p1, p2=BAR * p2, p3=BAR * p3, I=current)
 
@@ -192,10 +192,8 @@ class ClosedLoop:
 
     def __post_init__(self) -> None:
         """Simulate as given. Raises ValueError for another kind of controller, or as `simulated`."""
-        name = self.controller.name
-        if self.controller.environment != "EPValve-v0" or isinstance(self.controller, Privileged):
-            raise ValueError(f"{name!r} cannot have written a log: give a controller for EPValve-v0")
-        self.log.check_period(OnOff.default_period, f"{name!r} decides each")
+        check_can_log(self.controller)
+        self.log.check_period(OnOff.default_period, f"{self.controller.name!r} decides each")
         for drive in self.log.drives:
             if len(drive.coil) * self.log.period < SHORTEST:
                 raise ValueError(

@@ -3,12 +3,10 @@
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import Controller
 from controllers.monitor import (
     LINEAR,
     MonitorModel,
@@ -16,18 +14,15 @@ from controllers.monitor import (
     polynomial,
 )
 from controllers.tuned import tuned
-from epv_env.observation import decode
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
-from training.evaluation.rollout import make_env
+from training.drives import drives
 
-CONTROLLERS = ("hysteresis", "hysteresis, extrapolating", "pulse, adaptive")
+CONTROLLERS = ("hysteresis", "extrapolating hysteresis", "adaptive pulse")
 """Under which the openings are simulated: their conditions differ."""
 VOLTAGES = (0.92, 0.945, 0.97, 1.0, 1.03, 1.055, 1.08)
 """Of the energised coil, as shares of the plant's."""
-DRIVE = 30.0
-"""Length of a simulated drive [s]."""
 REPEATED = 6
 """Valves with each effect."""
 MEDIUM = 1.5
@@ -57,34 +52,6 @@ class Openings:
         """Those of the valves of one group of REPEATED."""
         own = self.valve // REPEATED == group
         return Openings(*(values[own] for values in vars(self).values()))
-
-
-def drives(
-    plant: Plant,
-    controller: Controller,
-    seeds: Sequence[int],
-    chosen: dict[str, Any],
-    *,
-    voltage: float = 1.0,
-    duration: float = DRIVE,
-) -> NDArray:
-    """What the control unit reads, (drives, periods, 6): coil, U [V], p1, p2, p3 [bar], I [A].
-
-    chosen: options of the reset, lists with an entry for each drive. voltage: share of the plant's.
-    """
-    options = {"plant": plant, "threads": 1, "supply_voltage": voltage * plant.voltage}
-    env = make_env(controller, len(seeds), **options)
-    observation, _ = env.reset(seed=list(seeds), options=chosen)
-    controller.reset(len(seeds))
-    found = np.empty((len(seeds), round(duration / env.settings.control_period), 6))
-    found[:, :, 1] = env.settings.supply_voltage
-    for k in range(found.shape[1]):
-        action = controller.act(observation)
-        p2 = decode(observation, "target") + decode(observation, "p2_error")
-        read = [decode(observation, name) for name in ("p1", "p3", "I")]
-        found[:, k, 0], found[:, k, 2:] = action, np.stack([read[0], p2, read[1], read[2]], axis=-1)
-        observation = env.advance(action).observation
-    return found
 
 
 def openings(drive: NDArray) -> Iterator[tuple[NDArray, NDArray]]:

@@ -1,115 +1,21 @@
-"""What the examples with other people's recordings share: data, disturbances, pictures, command."""
+"""What the examples with other people's recordings share: runs, causes and the command."""
 
 import argparse
-from collections.abc import Callable, Sequence
-from copy import copy
-from dataclasses import replace
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
-from epv_env.common.command_line import writable_folder
+from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.fit.prediction import predict
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Cause, FreeParameter, Run
-from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.report.gap_json import write_results
 from identification.gap.report.page import sections
 from identification.gap.report.sentences import verdict_sentence
 from identification.report.page import write_page
-
-NOISE_FACTORS = {"sigma=0.3": 0.3, "sigma=3": 3.0}
-"""Factors by which the noise is stated too small or too large [1]."""
-
-RIPPLE = "ripple"
-DISTURBANCES = (*NOISE_FACTORS, RIPPLE)
-
-RIPPLE_SIZE = 2.0
-"""Standard deviation of the ripple [noise deviations]."""
-
-RIPPLE_PERIODS = 10.0
-"""Sampling periods in which the autocorrelation of the ripple falls to 1/e [1]."""
-
-
-def disturbed(plant: OdePlant, disturbance: str, seed: int) -> OdePlant:
-    """The plant with one of DISTURBANCES; its noise is the given one, or what its readings show.
-
-    seed: of the ripple, an Ornstein-Uhlenbeck process on every channel.
-    """
-    noise = [channel.known_noise for channel in prepared(plant).channels]
-    other = copy(plant)
-    if disturbance in NOISE_FACTORS:
-        factor = NOISE_FACTORS[disturbance]
-        other.channels = tuple(
-            replace(channel, noise=factor * known)
-            for channel, known in zip(plant.channels, noise, strict=True)
-        )
-        return other
-    rng, memory = np.random.default_rng(seed), np.exp(-1.0 / RIPPLE_PERIODS)
-    runs = []
-    for run in plant.runs:
-        white = rng.standard_normal(run.measured.shape)
-        white[:, 1:] *= np.sqrt(1.0 - memory**2)
-        ripple = lfilter([1.0], [1.0, -memory], white)
-        size = RIPPLE_SIZE * np.array(noise)[:, None]
-        runs.append(replace(run, measured=run.measured + size * ripple))
-    other.runs = tuple(runs)
-    return other
-
-
-RECALIBRATED, WITH_CAUSES, MEASURED = "tab:orange", "tab:blue", "black"
-
-
-def prediction_figure(diagnosis: Diagnosis) -> Figure:
-    """The held-out run of middling error: readings and both models above, both errors below."""
-    plant, problem = diagnosis.ranking.problem.plant, diagnosis.ranking.problem
-    models = {"recalibrated model": (diagnosis.ranking.recalibrated.estimate, RECALIBRATED)}
-    if diagnosis.best:
-        label = "with " + " and ".join(each.replace("_", " ") for each in diagnosis.best.effects)
-        models[label] = (diagnosis.best.hypothesis.estimate, WITH_CAUSES)
-    residuals = {label: predict(problem, estimate).residuals for label, (estimate, _) in models.items()}
-    run = _middling_run(diagnosis, residuals["recalibrated model"])
-    own = plant.runs[run]
-    channels = len(plant.channels)
-    figure = Figure(figsize=(9.5, 2.6 * channels + 1.2), layout="constrained")
-    rows = figure.subplots(2 * channels, 1, sharex=True, height_ratios=[2.0, 1.0] * channels)
-    for c, channel in enumerate(plant.channels):
-        above, below = rows[2 * c], rows[2 * c + 1]
-        measured = np.where(own.trusted[c], own.measured[c], np.nan) / channel.scale
-        for label, (_, colour) in models.items():
-            error = residuals[label][run][c] * channel.known_noise / channel.scale
-            above.plot(own.time, measured - error, color=colour, linewidth=1.2, label=label)
-            below.plot(own.time, np.where(own.trusted[c], error, np.nan), color=colour, linewidth=0.9)
-        above.plot(own.time, measured, color=MEASURED, linewidth=0.8, label="measured")
-        _finish(above, f"{channel.name} [{channel.unit}]")
-        _finish(below, f"error [{channel.unit}]")
-    figure.legend(*rows[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
-    rows[-1].set_xlabel("time [s]")
-    figure.suptitle(f"{own.name}, never fitted to", fontsize="medium")
-    counted = own.time[np.any(own.trusted, axis=0)]
-    rows[-1].set_xlim(counted[0], counted[-1])
-    return figure
-
-
-def _finish(axes: Axes, label: str) -> None:
-    axes.set_ylabel(label, fontsize="small")
-    axes.grid(alpha=0.3)
-
-
-def _middling_run(diagnosis: Diagnosis, residuals: Sequence[NDArray]) -> int:
-    """The held-out run whose mean squared error is the median of all.
-
-    residuals: of each run, (channels, samples) [noise deviations].
-    """
-    runs = diagnosis.ranking.problem.plant.runs
-    held_out = [r for r, run in enumerate(runs) if run.held_out]
-    ordered = sorted(held_out, key=lambda r: float(np.mean(residuals[r] ** 2)))
-    return ordered[len(ordered) // 2]
 
 
 def found(path: Path, source: str) -> Path:
@@ -165,39 +71,21 @@ def cause(
     return Cause(name=name, component=component, parameters=(size,))
 
 
-def command(title: str, name: str, plant_of: Callable[[Path], OdePlant]) -> int:
+def command(title: str, plant_of: Callable[[Path], OdePlant]) -> int:
     """Diagnose the recordings in --data: gap.json, report.html and the verdict; returns the status.
 
-    title: of the plant, for the report. name: of its picture. plant_of: from the folder of recordings.
+    title: of the plant, for the report. plant_of: from the folder of recordings.
     """
     parser = argparse.ArgumentParser(description=f"Why a model of {title} misses its recordings.")
     parser.add_argument("--data", type=Path, required=True, help="folder of the recordings")
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
     parser.add_argument("--seed", type=int, default=0, help="of resampling")
-    parser.add_argument(
-        "--without", nargs="+", default=[], metavar="CAUSE", help="causes to leave out of the catalogue"
-    )
-    parser.add_argument(
-        "--with", nargs="+", default=[], metavar="CAUSE", dest="added",
-        help="causes to make part of the model, calibrated like the rest of it",
-    )  # fmt: skip
-    parser.add_argument(
-        "--disturb", choices=DISTURBANCES,
-        help="state 0.3 or three times the noise, or add a ripple of twice the noise",
-    )  # fmt: skip
-    parser.add_argument("--images", type=writable_folder, help="folder of recorded-NAME.png")
     chosen = parser.parse_args()
-    plant = changed(plant_of(chosen.data), without=chosen.without, added=chosen.added)
-    plant = disturbed(plant, chosen.disturb, chosen.seed) if chosen.disturb else plant
-    diagnosis = diagnose(plant, seed=chosen.seed)
+    diagnosis = diagnose(plant_of(chosen.data), seed=chosen.seed)
     write_results(diagnosis, chosen.out)
     heading = f"Gap between model and recordings: {title}"
     write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
-    if chosen.images:
-        chosen.images.mkdir(parents=True, exist_ok=True)
-        path = chosen.images / f"recorded-{name}.png"
-        prediction_figure(diagnosis).savefig(path, dpi=100, bbox_inches="tight")
-    print(verdict_sentence(diagnosis, "")[1])
+    print(verdict_sentence(diagnosis)[1])
     print(held_out_errors(diagnosis))
     return 0
 
@@ -220,24 +108,3 @@ def held_out_errors(diagnosis: Diagnosis) -> str:
         error = float(np.sqrt(np.mean(np.concatenate(held_out) ** 2)))
         errors.append(f"{label} {error:.3g} {plant.channels[0].unit}")
     return f"held-out error: {', '.join(errors)}"
-
-
-def changed(plant: OdePlant, *, without: Sequence[str] = (), added: Sequence[str] = ()) -> OdePlant:
-    """The plant without some causes in its catalogue, and with some as a part of its model.
-
-    Raises ValueError for a name that is no cause of it.
-    """
-    names = [cause.name for cause in plant.causes]
-    for unknown in {*without, *added} - set(names):
-        raise ValueError(f"{unknown} is no cause of this plant: choose from {', '.join(names)}")
-    parts = [
-        replace(size, nominal=size.trials[0], trials=())
-        for cause in plant.causes
-        if cause.name in added
-        for size in cause.parameters
-    ]
-    other = copy(plant)
-    other.causes = tuple(cause for cause in plant.causes if cause.name not in {*without, *added})
-    other.parameters = (*plant.parameters, *parts)
-    other.nominal = plant.nominal | {part.symbol: part.nominal for part in parts}
-    return other

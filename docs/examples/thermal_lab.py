@@ -120,4 +120,4 @@ def recordings(folder: Path) -> list[Run]:
 
 
 if __name__ == "__main__":
-    sys.exit(fail_clearly(lambda: command("a thermal lab", "thermal-lab", thermal_lab)))
+    sys.exit(fail_clearly(lambda: command("a thermal lab", thermal_lab)))

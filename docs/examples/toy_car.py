@@ -103,4 +103,4 @@ def recordings(folder: Path) -> list[Run]:
 
 
 if __name__ == "__main__":
-    sys.exit(fail_clearly(lambda: command("a toy car", "toy-car", toy_car)))
+    sys.exit(fail_clearly(lambda: command("a toy car", toy_car)))

@@ -5,7 +5,8 @@ import importlib
 import os
 from unittest.mock import patch
 
-from epv_env.common.commands import commands, help_line, parser_of
+from epv_env.common.commands import commands, help_line
+from epv_env.common.options import SHOWN_DEFAULT, parser_of
 from training.epv import PACKAGES
 
 WIDTH = "88"
@@ -31,7 +32,7 @@ def _row(action: argparse.Action) -> str:
     """One option: its names, its default and what it means."""
     names = ", ".join(f"`{name}`" for name in action.option_strings or [action.dest.upper()])
     choices = f"one of {', '.join(map(str, action.choices))}" if action.choices else ""
-    meaning = "; ".join(filter(None, (action.help, choices))).replace("%%", "%")
+    meaning = "; ".join(filter(None, ((action.help or "").removesuffix(SHOWN_DEFAULT), choices)))
     cells = (names, _default(action), meaning)
     return "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 

@@ -1,10 +1,8 @@
-"""What the command lines share: options, checked paths and numbers, and errors as one sentence.
+"""What the command lines share: errors as one sentence, interruptions, and the command to run next.
 
 Ctrl-C and SIGTERM end a command and its worker processes without a traceback.
 """
 
-import argparse
-import math
 import os
 import shlex
 import shutil
@@ -20,7 +18,6 @@ from types import FrameType
 
 from epv_env.common.compilation import announce_compilation
 from epv_env.common.extras import missing_package
-from epv_env.common.files import check_writable
 
 SIGNALS = (signal.SIGINT, signal.SIGTERM)
 
@@ -93,10 +90,13 @@ class NextStep:
     """What for, as in "to train a policy"."""
     words: tuple[object, ...]
     """The command's name and its arguments."""
+    plant: Path | None = None
+    """Its plant file; None: the report's calibration."""
 
     def command(self, program: str = "epv") -> str:
         """The line to paste into a shell."""
-        return shlex.join([program, *map(str, self.words)])
+        plant = ("--plant", self.plant) if self.plant else ()
+        return shlex.join([program, *map(str, (*self.words, *plant))])
 
     def __str__(self) -> str:
         """For a terminal, where `epv` is not on the path unless the environment is activated."""
@@ -106,116 +106,6 @@ class NextStep:
         return f"next, {self.purpose}:\n    {self.command(program)}"
 
 
-def plant_option(plant: Path | None) -> tuple[object, ...]:
-    """--plant and its file, for the next command; nothing for the report's calibration."""
-    return ("--plant", plant) if plant else ()
-
-
 def beside(folder: Path, name: str) -> Path:
     """A folder for what the next command makes of this one: runs/ppo gives runs/ppo-NAME."""
     return folder.with_name(f"{folder.name}-{name}")
-
-
-def writable_file(text: str) -> Path:
-    """A path whose folder can be written, for argparse."""
-    path = Path(text)
-    writable_folder(str(path.parent))
-    if path.is_dir():
-        raise argparse.ArgumentTypeError(f"{path} is a folder: give the name of a file")
-    try:
-        check_writable(path)
-    except OSError as error:
-        raise argparse.ArgumentTypeError(f"{path}: {error.strerror}") from None
-    return path
-
-
-def writable_folder(text: str) -> Path:
-    """A path at which a folder exists or can be made and written, for argparse."""
-    path = Path(text)
-    existing = path.absolute()
-    while not existing.exists():
-        existing = existing.parent
-    if not existing.is_dir():
-        raise argparse.ArgumentTypeError(f"{existing} is not a folder: choose another path")
-    if not os.access(existing, os.W_OK | os.X_OK):
-        raise argparse.ArgumentTypeError(f"{existing} cannot be written: choose another path")
-    return path
-
-
-@dataclass(frozen=True)
-class Number:
-    """A number within a range, for argparse. What lies beyond is a slip, and would fail late."""
-
-    kind: type[int] | type[float]
-    low: float
-    high: float
-
-    def __call__(self, text: str) -> float:
-        """The number. Raises ArgumentTypeError, with the range in its sentence."""
-        try:
-            value = self.kind(text)
-        except ValueError:
-            value = math.nan
-        if not self.low <= value <= self.high:  # not true for NaN
-            name = "whole number" if self.kind is int else "number"
-            shown = text if len(text) < 40 else text[:40] + "..."
-            span = f"from {self.low:.10g} to {self.high:.10g}"
-            raise argparse.ArgumentTypeError(f"{shown} must be a {name} {span}")
-        return value
-
-
-COUNT = Number(int, 1, 10**9)
-"""Episodes, trials or steps."""
-SEED = Number(int, 0, 2**32 - 1)
-"""What NumPy's and torch's generators take."""
-SECONDS = Number(float, 1e-6, 3600.0)
-"""Length of an episode [s]: the figures of a longer one than an hour fill the memory."""
-JUDGED_SECONDS = Number(float, 0.55, SECONDS.high)
-"""Length of an episode whose pressures are judged [s]: they count from 0.5 s on."""
-
-
-def add_out(
-    parser: argparse.ArgumentParser, default: str | None = None, *, help: str = "folder of results"
-) -> None:
-    """Add --out, a folder that exists or can be made; required unless there is a default."""
-    parser.add_argument(
-        "--out",
-        type=writable_folder,
-        default=default and Path(default),
-        required=default is None,
-        help=help,
-    )
-
-
-def add_plant(
-    parser: argparse.ArgumentParser, *, help: str = "plant file (default: the report's calibration)"
-) -> None:
-    """Add --plant, a plant file."""
-    parser.add_argument("--plant", type=Path, metavar="FILE", help=help)
-
-
-def add_seed(parser: argparse.ArgumentParser, *, default: int = 0, help: str) -> None:
-    """Add --seed; help: what the seed draws."""
-    parser.add_argument("--seed", type=SEED, default=default, help=help)
-
-
-def add_workers(parser: argparse.ArgumentParser) -> None:
-    """Add --workers, the number of processes."""
-    parser.add_argument("--workers", type=Number(int, 1, 1024), help="processes (default: all cores)")
-
-
-def add_device(parser: argparse.ArgumentParser, *, help: str) -> None:
-    """Add --device; help: what runs there."""
-    parser.add_argument(
-        "--device", choices=("cpu", "cuda"), default="cpu",
-        help=f"{help}: the processor, or an NVIDIA accelerator (extra gpu)",
-    )  # fmt: skip
-
-
-def add_episodes(parser: argparse.ArgumentParser) -> None:
-    """Add --duration, --seed, --plant, --workers and --device of the episodes that are compared."""
-    parser.add_argument("--duration", type=JUDGED_SECONDS, default=10.0, help="of an episode [s]")
-    add_seed(parser, help="of the first episode, within its range")
-    add_plant(parser)
-    add_workers(parser)
-    add_device(parser, help="of the plants")

@@ -3,29 +3,31 @@
 A command's module has
 
 - its help line as the first line of its docstring,
-- `add_options(parser)`, which adds the options to an argparse parser,
+- `Options`, a dataclass that declares the options (epv_env/common/options.py),
 - `run(options)`, which raises ValueError or OSError with one sentence for what it cannot use,
 - `next_step(options)`, which says what to run after it, or None where that depends on the user,
-- `QUICK` if it has a short form: what `--quick` sets, as {option: value}.
+- `QUICK` if it has an option `quick`: what that sets, as {option: value}.
 
 The file's name is the command's: `sim_to_real.py` is `sim-to-real`, `import_.py` is `import`.
 An option `out` is a folder of results, which one process at a time writes.
 """
 
-import argparse
 import ast
 import difflib
 import importlib
 import pkgutil
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from contextlib import nullcontext
 from importlib.metadata import version
 from importlib.resources import files
-from types import ModuleType
+
+from threadpoolctl import threadpool_limits
 
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.extras import DISTRIBUTION, missing_package
+from epv_env.common.options import parse
+from epv_env.common.results_folder import only_writer
 
 
 def main(packages: Sequence[str], *, program: str, arguments: Sequence[str] | None = None) -> int:
@@ -36,24 +38,24 @@ def main(packages: Sequence[str], *, program: str, arguments: Sequence[str] | No
         program: what the user types before the command's name.
         arguments: None for those of the process.
     """
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    return fail_clearly(lambda: _run_named(commands(packages), program, given))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return fail_clearly(lambda: _run_named(commands(packages), program, words))
 
 
 def main_of(module: str, *, program: str, arguments: Sequence[str] | None = None) -> int:
     """Run the command of one module, such as "training.commands.train"; returns the exit status."""
-    given = list(sys.argv[1:] if arguments is None else arguments)
-    return fail_clearly(lambda: _run(module, program, given))
+    words = list(sys.argv[1:] if arguments is None else arguments)
+    return fail_clearly(lambda: _run(module, program, words))
 
 
 def commands(packages: Sequence[str]) -> dict[str, str]:
     """Modules of all commands by the commands' names, in alphabetical order."""
-    found = {
+    modules = {
         module.name.strip("_").replace("_", "-"): f"{package}.{module.name}"
         for package in packages
         for module in pkgutil.iter_modules(importlib.import_module(package).__path__)
     }
-    return dict(sorted(found.items()))
+    return dict(sorted(modules.items()))
 
 
 def help_line(module: str) -> str:
@@ -63,30 +65,12 @@ def help_line(module: str) -> str:
     return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
 
 
-def parser_of(module: ModuleType, program: str) -> argparse.ArgumentParser:
-    """The parser of a command, with `--quick` if it has a short form."""
-    parser = argparse.ArgumentParser(
-        prog=program,
-        description=module.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-    )
-    module.add_options(parser)
-    if hasattr(module, "QUICK"):
-        parser.add_argument("--quick", action="store_true", help="a short run that shows that all works")
-    return parser
-
-
-def parse(module: ModuleType, program: str, arguments: Sequence[str]) -> argparse.Namespace:
-    """The options. With --quick, QUICK are the defaults: what is given beside it still holds."""
-    parser = parser_of(module, program)
-    if hasattr(module, "QUICK") and parser.parse_known_args(arguments)[0].quick:
-        parser.set_defaults(**module.QUICK)
-    return parser.parse_args(arguments)
-
-
 def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
-        print(_overview(known, program))
+        width = max(map(len, known))
+        lines = [f"  {name:{width}}  {help_line(module)}" for name, module in known.items()]
+        print(f"usage: {program} COMMAND [options]", "", *lines, "", sep="\n")
+        print(f"{program} COMMAND --help lists its options, {program} --version the version")
         return 0
     if arguments[0] == "--version":
         print(program, version(DISTRIBUTION))
@@ -99,18 +83,15 @@ def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> 
     return _run(known[name], f"{program} {name}", rest)
 
 
-def _overview(known: Mapping[str, str], program: str) -> str:
-    width = max(map(len, known))
-    lines = [f"  {name:{width}}  {help_line(module)}" for name, module in known.items()]
-    last = f"{program} COMMAND --help lists its options, {program} --version the version"
-    return "\n".join([f"usage: {program} COMMAND [options]", "", *lines, "", last])
-
-
 def _run(name: str, program: str, arguments: list[str]) -> int:
     try:
         module = importlib.import_module(name)
         options = parse(module, program, arguments)
-        _alone(module.run, options)
+        out = getattr(options, "out", None)
+        alone = nullcontext() if out is None else only_writer(out)
+        # The matrices are small: threads of the linear algebra would only wait for each other.
+        with threadpool_limits(1, user_api="blas"), alone:
+            module.run(options)
         if step := module.next_step(options):
             print(f"\n{step}")
     except ModuleNotFoundError as error:
@@ -120,15 +101,3 @@ def _run(name: str, program: str, arguments: list[str]) -> int:
             raise
         raise ValueError(f"{program}: {sentence}") from None
     return 0
-
-
-def _alone(run: Callable[[argparse.Namespace], None], options: argparse.Namespace) -> None:
-    """Run a command while no other process writes into its folder."""
-    from threadpoolctl import threadpool_limits
-
-    from epv_env.common.results_folder import only_writer
-
-    out = getattr(options, "out", None)
-    # The matrices are small: threads of the linear algebra would only wait for each other.
-    with threadpool_limits(1, user_api="blas"), nullcontext() if out is None else only_writer(out):
-        run(options)

@@ -73,7 +73,7 @@ def only_writer(folder: Path) -> Iterator[None]:
 
     Raises ValueError if another process writes into the folder.
     """
-    made = _missing_parents(folder)
+    made = [level for level in (folder, *folder.parents) if not level.exists()]
     folder.mkdir(parents=True, exist_ok=True)
     path = folder / LOCK_FILE
     lock = FileLock(path)
@@ -90,21 +90,9 @@ def only_writer(folder: Path) -> Iterator[None]:
         with suppress(OSError):
             path.unlink()
         lock.release()
-        _remove_empty(made)
-
-
-def _missing_parents(folder: Path) -> list[Path]:
-    """The folder and those above it that do not exist yet, the innermost first."""
-    return [each for each in (folder, *folder.parents) if not each.exists()]
-
-
-def _remove_empty(folders: list[Path]) -> None:
-    """Remove folders that hold nothing, the innermost first."""
-    for folder in folders:
-        try:
-            folder.rmdir()
-        except OSError:
-            return
+        with suppress(OSError):
+            for level in made:
+                level.rmdir()  # as long as they are empty
 
 
 Item = TypeVar("Item")

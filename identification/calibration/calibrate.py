@@ -26,12 +26,6 @@ STARTS = 6
 NEAR_BOUND = 1e-3
 """Share of a domain's width from its end, within which an estimate counts as on that end."""
 
-ILL_CONDITIONED = 30.0
-"""Condition number of the normalised sensitivities from which collinearity is strong (Belsley 1980)."""
-
-INVOLVED_WEIGHT = 0.3
-"""Weight of a parameter in the flattest direction from which the warning names the parameter."""
-
 EXPLAINED = 1.2
 """Root mean square residual, in noise deviations, up to which the model explains the recordings."""
 
@@ -148,12 +142,16 @@ def _other_minima(method: str, fits: list[SearchResult]) -> list[str]:
 
 
 def inseparable_symbols(problem: CalibrationProblem, fit: SearchResult) -> tuple[list[str], float]:
-    """Parameters that the recordings cannot separate, if any, and the condition number [1]."""
+    """Parameters that the recordings cannot separate, if any, and the condition number [1].
+
+    Collinearity is strong from 30 on (Belsley 1980); the parameters are those with weight in the
+    flattest direction.
+    """
     jacobian = np.vstack(problem.least_squares().linearised(fit.z)[1])
     normalised = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
     condition = float(np.linalg.cond(normalised))
-    if condition < ILL_CONDITIONED:
+    if condition < 30.0:
         return [], condition
     direction = np.abs(np.linalg.svd(normalised, full_matrices=False)[2][-1])
-    involved = [s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > INVOLVED_WEIGHT]
+    involved = [s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > 0.3]
     return involved, condition

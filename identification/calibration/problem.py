@@ -21,15 +21,6 @@ from identification.recordings.recording import OUTPUTS, Campaign, CampaignError
 from identification.replay.model_inputs import model_inputs, without_offsets
 from identification.replay.replay import P2_SHIFT, Replay, measured_outputs
 
-PRESSURE_STEP = 1e3
-"""Change of the start's circuit pressure by which its influence is measured [Pa]."""
-
-RELATIVE_STEP = 1e-4
-"""Change of a scaled parameter for a finite difference."""
-
-FAILED_RESIDUAL = 1e3
-"""Residual, in units of its weight, of samples of a candidate that cannot be integrated."""
-
 
 @dataclass(frozen=True)
 class ParameterVector:
@@ -124,7 +115,7 @@ class WeightedResiduals:
         A difference is taken away from the nearer end of a parameter's domain.
         """
         low, high = self.vector.bounds.T
-        step = RELATIVE_STEP * np.where(z > 0.5 * (low + high), -1.0, 1.0)
+        step = 1e-4 * np.where(z > 0.5 * (low + high), -1.0, 1.0)
         pairs = self._projected(z, np.diag(step))
         return (
             [residual for residual, _ in pairs],
@@ -135,7 +126,7 @@ class WeightedResiduals:
         """Residual (3 samples,) and its changes (3 samples, m) by the steps (m, k), per recording."""
         candidates = np.vstack([z, z, z + steps])
         shift = np.zeros(len(candidates))
-        shift[1] = PRESSURE_STEP
+        shift[1] = 1e3  # Pa, by which the influence of the start is measured
         outputs = self.replay.outputs({**self.vector.values(candidates), P2_SHIFT: shift})
         return [
             _without_nuisances(model, measured, weights)
@@ -149,7 +140,8 @@ def _without_nuisances(model: NDArray, measured: NDArray, weights: NDArray) -> t
     model: (3, samples, 2 + m): candidate, the same with p2 shifted at the start, and m steps.
     """
     weighted = (weights[:, :, None] * model).reshape(measured.size, -1)
-    residual = np.nan_to_num((weights * measured).ravel() - weighted[:, 0], nan=FAILED_RESIDUAL)
+    # A candidate that cannot be integrated is far off.
+    residual = np.nan_to_num((weights * measured).ravel() - weighted[:, 0], nan=1e3)
     nuisances = np.zeros((*measured.shape, 3))
     nuisances[..., 0] = (weighted[:, 1] - weighted[:, 0]).reshape(measured.shape)
     for column, output in ((1, "p3"), (2, "I")):

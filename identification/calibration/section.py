@@ -1,4 +1,4 @@
-"""The calibration in the report: Tables 10 to 13 and Figures 10 to 13."""
+"""The calibration in the report: Tables 10 to 13 and the worst of Figures 10 to 13."""
 
 from typing import Any
 
@@ -6,8 +6,8 @@ from epv_env.plant.parameters import table
 from identification.calibration.calibrate import Calibration
 from identification.calibration.search import METHODS, reached_best
 from identification.replay.replay import total_response_error
-from identification.replay.response_blocks import error_table, errors_as_json, percent, response_figure
-from identification.report.page import Picture, Section, Table, Text, Verdict
+from identification.replay.response_blocks import error_table, errors_as_json, percent, worst_picture
+from identification.report.page import Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR
 
 
@@ -21,14 +21,11 @@ def calibration_section(calibration: Calibration) -> Section:
         ],
         blocks=[
             _estimates(calibration),
-            Text(text=_offsets(calibration)),
+            _offsets(calibration),
             _starts(calibration),
             error_table(calibration.before, "Errors at the start's parameters."),
             *(error_table(calibration.after[method], f"Errors after {method}.") for method in METHODS),
-            *(
-                Picture(figure=response_figure(response), caption=response.recording.name)
-                for response in calibration.after["least squares"][:8]
-            ),
+            worst_picture(calibration.after["least squares"]),
         ],
     )
 

@@ -1,52 +1,44 @@
 """Write a campaign of a virtual bench whose truth is known."""
 
-import argparse
-from dataclasses import replace
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Annotated
 
-from epv_env.common.command_line import (
-    NextStep,
-    add_out,
-    add_plant,
-    add_seed,
-    beside,
-    plant_option,
-    writable_file,
-)
-from epv_env.plant.effects.registry import CATALOGUE
+from epv_env.common.command_line import NextStep, beside
+from epv_env.common.options import Folder, PlantFile, Seed, writable_file
+from epv_env.plant.effects.registry import CATALOGUE, effect
 from epv_env.plant.parameters import Parameters, written_value
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Region
 from identification.bench.programmes import SUITES, at_voltage, load_programmes
 from identification.bench.session import run_bench
 from identification.recordings.campaign_files import check_vacant, write_campaign
-from identification.recordings.rules import RULES, rules_of
+from identification.recordings.rules import rules_of
 from identification.report_2003 import SAMPLING_RATE
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the recordings, the true plant, and where both are written."""
-    add_out(parser, help="folder of the campaign")
-    add_seed(parser, help="of the sensors' noise")
-    recordings = parser.add_mutually_exclusive_group()
-    recordings.add_argument("--suite", choices=SUITES, default="report", help="which recordings")
-    recordings.add_argument("--programme", type=Path, default=None, help="JSON file of other recordings")
-    parser.add_argument("--rate", type=float, default=SAMPLING_RATE, help="samples per second")
-    add_plant(parser, help="plant file of the truth; default: Table 12")
-    parser.add_argument(
-        "--set", action="append", default=[], metavar="SYMBOL=VALUE", help="another true value [SI]"
-    )
-    parser.add_argument(
-        "--effect",
-        action="append",
-        default=[],
-        metavar="NAME=SIZE",
-        help="an effect (docs/explanation/effects.md)",
-    )
-    parser.add_argument("--truth", type=writable_file, help="plant file to write the truth to")
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The recordings, the true plant, and where both are written."""
+
+    out: Annotated[Folder, "folder of the campaign"]
+    seed: Annotated[Seed, "of the sensors' noise"] = 0
+    suite: Annotated[str, {"choices": SUITES, "group": "recordings"}, "which recordings"] = "report"
+    programme: Annotated[Path | None, {"group": "recordings"}, "JSON file of other recordings"] = None
+    rate: Annotated[float, "samples per second"] = SAMPLING_RATE
+    plant: Annotated[PlantFile, "plant file of the truth; default: Table 12"] = None
+    set: Annotated[
+        Sequence[str], {"action": "append", "metavar": "SYMBOL=VALUE"}, "another true value [SI]"
+    ] = ()
+    effect: Annotated[
+        Sequence[str], {"action": "append", "metavar": "NAME[=SIZE]"},
+        "an effect, of typical size unless given (docs/explanation/effects.md)",
+    ] = ()  # fmt: skip
+    truth: Annotated[Path | None, writable_file, "plant file to write the truth to"] = None
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Write the campaign. Raises ValueError for a wrong value, or a folder that holds a campaign."""
     check_vacant(options.out)
     plant = load_plant(options.plant)
@@ -55,8 +47,7 @@ def run(options: argparse.Namespace) -> None:
         programmes = load_programmes(options.programme, plant.sensors)
     else:
         programmes = at_voltage(SUITES[options.suite], plant.voltage)
-    rules = rules_of(plant) if options.plant else RULES
-    campaign = run_bench(programmes, truth, seed=options.seed, rate=options.rate, rules=rules)
+    campaign = run_bench(programmes, truth, seed=options.seed, rate=options.rate, rules=rules_of(plant))
     write_campaign(campaign, options.out)
     if options.truth is not None:
         itself = {"parameters": truth, "region": Region(centre=truth), "diagnosis": None}
@@ -66,39 +57,40 @@ def run(options: argparse.Namespace) -> None:
         print("to add them to another campaign, see docs/how-to/diagnose-a-gap.md")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Calibrate the model on the campaign."""
-    words = ("run", options.out, "--out", beside(options.out, "results"), *plant_option(options.plant))
-    return NextStep("to calibrate the model on these recordings", words)
+    words = ("run", options.out, "--out", beside(options.out, "results"))
+    return NextStep("to calibrate the model on these recordings", words, options.plant)
 
 
-def true_parameters(options: argparse.Namespace, plant: Plant) -> Parameters:
+def true_parameters(options: Options, plant: Plant) -> Parameters:
     """The plant's parameters with what --set and --effect change. Raises ValueError."""
-    own = plant.parameters.own_domains
-    true = {name: written_value(name, value, own) for name, value in _true_values(options).items()}
-    return plant.parameters.replace(**true)
-
-
-def _true_values(options: argparse.Namespace) -> dict[str, float]:
-    """What --set and --effect give, by symbol. Raises ValueError for what is not of their form."""
     values: dict[str, float] = {}
     for setting in options.set:
         symbol, _, text = setting.partition("=")
         values[symbol] = _number(text, f"--set {setting}: give SYMBOL=VALUE", "--set R=43.5")
     for setting in options.effect:
-        name, _, text = setting.partition("=")
-        symbols, sizes = CATALOGUE.get(name), text.split(",")
-        if symbols is None:
-            raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
-        if len(sizes) != len(symbols):
-            raise ValueError(
-                f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "
-                "parted by commas"
-            )
-        rule = f"--effect {setting}: give NAME=SIZE"
-        for symbol, size in zip(symbols, sizes, strict=True):
-            values[symbol] = _number(size, rule, "--effect piston_friction=8,0")
-    return values
+        values |= effect_sizes(setting)
+    own = plant.parameters.own_domains
+    true = {name: written_value(name, value, own) for name, value in values.items()}
+    return plant.parameters.replace(**true)
+
+
+def effect_sizes(setting: str) -> dict[str, float]:
+    """Sizes of an effect by symbol: given as NAME=SIZE, or typical for NAME alone. Raises ValueError."""
+    name, given, text = setting.partition("=")
+    symbols, sizes = CATALOGUE.get(name), text.split(",")
+    if symbols is None:
+        raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
+    if not given:
+        return {size.symbol: size.typical for size in effect(name).drawn[0]}
+    if len(sizes) != len(symbols):
+        raise ValueError(
+            f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "
+            "parted by commas"
+        )
+    rule, example = f"--effect {setting}: give NAME=SIZE", "--effect piston_friction=8,0"
+    return {s: _number(size, rule, example) for s, size in zip(symbols, sizes, strict=True)}
 
 
 def _number(text: str, rule: str, example: str) -> float:

@@ -3,10 +3,13 @@
 The guide is docs/how-to/use-your-recordings.md.
 """
 
-import argparse
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import Annotated
 
-from epv_env.common.command_line import NextStep, Number, add_out, add_plant
+from epv_env.common.command_line import NextStep
+from epv_env.common.options import Folder, Number, PlantFile
 from epv_env.plant.plantfile import load_plant
 from identification.commands import bench
 from identification.importing.import_campaign import (
@@ -16,45 +19,35 @@ from identification.importing.import_campaign import (
     source_table,
 )
 from identification.recordings.campaign_files import check_campaign, check_vacant, write_campaign
-from identification.recordings.rules import RULES, rules_of
+from identification.recordings.rules import rules_of
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the files, the mapping and the ambient conditions."""
-    parser.add_argument(
-        "files", nargs="+", type=Path, metavar="FILE", help="MDF, MATLAB, TDMS, Parquet or text files"
-    )
-    add_out(parser, help="folder of the campaign")
-    add_plant(parser, help="plant file of another valve than the report's, for the checks")
-    parser.add_argument(
-        "--mapping", type=Path, default=None, help="JSON file that says what names and units do not"
-    )
-    parser.add_argument(
-        "--ambient-bar",
-        type=Number(float, 0.01, 100.0),
-        help="pressure of the environment [bar absolute]",
-    )
-    parser.add_argument(
-        "--gauge",
-        action="store_true",
-        help="pressures are gauge where no unit says gauge or absolute",
-    )
-    parser.add_argument(
-        "--temperature-K", type=Number(float, 1.0, 1000.0), help="of the environment [K]"
-    )
-    parser.add_argument(
-        "--rate",
-        type=Number(float, 1.0, 1e7),
-        help="samples per second; default: the slowest channel's",
-    )
-    parser.add_argument("--name", default=None, help="of the campaign; default: the files' folder")
-    parser.add_argument("--dry-run", action="store_true", help="show everything and write nothing")
+@dataclass(frozen=True)
+class Options:
+    """The files, the mapping and the ambient conditions."""
+
+    files: Annotated[
+        Sequence[Path], {"nargs": "+", "metavar": "FILE"}, "MDF, MATLAB, TDMS, Parquet or text files"
+    ]
+    _: KW_ONLY
+    out: Annotated[Folder, "folder of the campaign"]
+    plant: Annotated[PlantFile, "plant file of another valve than the report's, for the checks"] = None
+    mapping: Annotated[Path | None, "JSON file that says what names and units do not"] = None
+    ambient_bar: Annotated[
+        float | None, Number(float, 0.01, 100.0), "pressure of the environment [bar absolute]"
+    ] = None
+    gauge: Annotated[bool, "pressures are gauge where no unit says gauge or absolute"] = False
+    temperature_K: Annotated[float | None, Number(float, 1.0, 1000.0), "of the environment [K]"] = None
+    rate: Annotated[
+        float | None, Number(float, 1.0, 1e7), "samples per second; default: the slowest channel's"
+    ] = None
+    name: Annotated[str | None, "of the campaign; default: the files' folder"] = None
+    dry_run: Annotated[bool, "show everything and write nothing"] = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Show what the files hold and write the campaign. Raises ImportingError or CampaignError."""
     check_vacant(options.out)
-    rules = rules_of(load_plant(options.plant)) if options.plant else RULES
     for file in options.files:
         print(source_table(read_source(file)), end="\n\n")
     imported = read_files(
@@ -65,7 +58,7 @@ def run(options: argparse.Namespace) -> None:
         rate=options.rate,
         name=options.name,
         gauge=options.gauge,
-        rules=rules,
+        rules=rules_of(load_plant(options.plant)),
     )
     print(import_text(imported), end="\n\n")
     if options.dry_run:
@@ -76,6 +69,7 @@ def run(options: argparse.Namespace) -> None:
     print(f"{len(imported.files)} recordings in {options.out}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep | None:
+def next_step(options: Options) -> NextStep | None:
     """As after a bench; None after a dry run, which says what to leave out."""
-    return None if options.dry_run else bench.next_step(options)
+    recorded = bench.Options(out=options.out, plant=options.plant)
+    return None if options.dry_run else bench.next_step(recorded)

@@ -24,12 +24,6 @@ from identification.confidence.covariance import (
     estimate_covariance,
 )
 
-GRADIENT_STEP, HESSIAN_STEP = 1e-5, 1e-3
-"""Changes of a scaled parameter for the gradient and the Hessian of the total error."""
-
-PROFILE_HALF_WIDTH, PROFILE_POINTS = 0.01, 41
-"""How far to either side a parameter is moved for its profile, relative, and in how many points."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class ReportInterval:
@@ -85,10 +79,6 @@ class Minimum:
     """By the scaled parameters (k,); a fraction per fraction."""
     eigenvalues: NDArray
     """Of the Hessian (k,); all positive at a minimum."""
-    offsets: NDArray
-    """Relative changes of one parameter at a time (points,)."""
-    profiles: NDArray
-    """Total error with one parameter changed and the others held (k, points)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -167,11 +157,8 @@ def assess_confidence(calibration: Calibration, *, seed: int = 0) -> Confidence:
 
 def _minimum(problem: CalibrationProblem, z: NDArray) -> Minimum:
     error = problem.total_error().error
-    offsets = np.linspace(-PROFILE_HALF_WIDTH, PROFILE_HALF_WIDTH, PROFILE_POINTS)
-    hessian = approx_hess(z, error, epsilon=np.full(len(z), HESSIAN_STEP))
+    hessian = approx_hess(z, error, epsilon=np.full(len(z), 1e-3))
     return Minimum(
-        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=GRADIENT_STEP, centered=True)),
+        gradient=np.atleast_1d(approx_fprime(z, error, epsilon=1e-5, centered=True)),
         eigenvalues=np.linalg.eigvalsh(0.5 * (hessian + hessian.T)),
-        offsets=offsets,
-        profiles=np.array([[error(z * (1 + d * axis)) for d in offsets] for axis in np.eye(len(z))]),
     )

@@ -27,9 +27,6 @@ INPUT_DRAWS = 8
 INPUTS = ("U", "p1")
 """Channels that the model takes as known."""
 
-ZEROED = ("U", "p1", "p2")
-"""Channels whose offset at rest matters; those of p3 and I are nuisances of each recording."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class EstimateCovariance:
@@ -133,11 +130,14 @@ def _input_share(
 def _offset_share(
     problem: CalibrationProblem, misfit: WeightedResiduals, z: NDArray, influence: Sequence[NDArray]
 ) -> NDArray:
-    """How far the standard errors of the offsets, common to all recordings, move the estimate."""
+    """How far the standard errors of the offsets, common to all recordings, move the estimate.
+
+    Those of p3 and I do not count: they are nuisances of each recording.
+    """
     values = misfit.vector.values(z)
     known = misfit.replay.outputs(values)
     share = np.zeros((len(z), len(z)))
-    for channel in (name for name in ZEROED if name in problem.offsets):
+    for channel in (name for name in ("U", "p1", "p2") if name in problem.offsets):
         error = problem.offsets[channel].error
         drives = [_shifted(drive, channel, error) for drive in misfit.replay.drives]
         models = Replay(drives, misfit.vector.reference).outputs(values)

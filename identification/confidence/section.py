@@ -1,13 +1,12 @@
-"""The confidence stage in the report: Table 14, and Figures 16 and 17."""
+"""The confidence stage in the report: Table 14."""
 
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from epv_env.plant.parameters import table
 from identification.confidence.confidence import Confidence
-from identification.report.page import Picture, Section, Table, Verdict
+from identification.report.page import Section, Table, Verdict
 
 PRECISE = 0.05
 """Half width of an interval, relative to the estimate, below which the estimate is precise."""
@@ -22,11 +21,7 @@ def confidence_section(confidence: Confidence) -> Section:
     return Section(
         title="Confidence",
         verdicts=[_precision(confidence), _agreement(confidence), _minimum(confidence)],
-        blocks=[
-            _intervals(confidence),
-            _correlations(confidence),
-            Picture(figure=profiles(confidence), caption="Model error over one parameter at a time."),
-        ],
+        blocks=[_intervals(confidence), _correlations(confidence)],
     )
 
 
@@ -89,7 +84,7 @@ def _intervals(confidence: Confidence) -> Table:
     estimates, intervals = confidence.estimate * vector.scale, confidence.intervals()
     rows = [
         [
-            _axis(symbol),
+            symbol if table()[symbol].unit == "1" else f"{symbol} [{table()[symbol].unit}]",
             *(f"{value:.7g}" for value in (estimate, *intervals[symbol])),
             *(f"{100 * deviation:.4f}" for deviation in own),
         ]
@@ -113,31 +108,3 @@ def _correlations(confidence: Confidence) -> Table:
         [symbol, *(f"{value:.3f}" for value in row)] for symbol, row in zip(symbols, matrix, strict=True)
     ]
     return Table(columns=["", *symbols], rows=rows, caption="Correlation of the estimates.")
-
-
-def profiles(confidence: Confidence) -> Figure:
-    """Total error over one parameter at a time, the others held (Figures 16 and 17)."""
-    vector = confidence.problem.vector
-    figure = Figure(figsize=(9, 5.5), layout="constrained")
-    count = len(vector.symbols)
-    columns = 2 if count <= 4 else 3
-    panels = np.ravel(figure.subplots(-(-count // columns), columns, squeeze=False))
-    for spare in panels[count:]:
-        spare.remove()
-    centre = confidence.nelder_mead * vector.scale
-    rows = zip(panels[:count], vector.symbols, centre, confidence.minimum.profiles, strict=True)
-    for axes, symbol, value, profile in rows:
-        axes.plot(value * (1 + confidence.minimum.offsets), 100 * profile, color="tab:blue")
-        low, high = confidence.intervals()[symbol]
-        axes.axvspan(low, high, color="tab:green", alpha=0.3, label="95 % interval")
-        axes.axvline(value, color="black", linewidth=0.6)
-        axes.set_xlabel(_axis(symbol))
-        axes.grid(alpha=0.3)
-    panels[0].legend(fontsize="small")
-    figure.supylabel("total error [%]")
-    return figure
-
-
-def _axis(symbol: str) -> str:
-    unit = table()[symbol].unit
-    return symbol if unit == "1" else f"{symbol} [{unit}]"

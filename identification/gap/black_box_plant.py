@@ -33,15 +33,12 @@ Simulate = Callable[[Mapping[str, float], Run], NDArray]
 It raises ArithmeticError where a candidate cannot be simulated.
 """
 
-Regimes = Callable[[Run, NDArray], Mapping[str, NDArray]]
-"""(run, outputs (channels, samples) [SI]) to boolean (samples,) by regime."""
-
 
 class BlackBoxPlant:
     """`GreyBox` around a function that simulates one candidate at a time.
 
-    Nothing is known of states and equations: a gap is located by channel, reading and regime, and drawn
-    over inputs and outputs, but in no equation.
+    Nothing is known of states and equations: a gap is located by channel and reading, and drawn over
+    inputs and outputs, but in no equation and no regime.
     """
 
     def __init__(
@@ -54,7 +51,6 @@ class BlackBoxPlant:
         causes: Sequence[Cause] = (),
         tolerances: Sequence[NuisanceParameter] = (),
         run_offsets: Sequence[NuisanceParameter] = (),
-        regimes: Regimes | None = None,
         executor: Executor | None = None,
     ):
         """Describe the plant; `GreyBox` says what each member means.
@@ -68,7 +64,6 @@ class BlackBoxPlant:
             causes: what may be wrong.
             tolerances: scatter from unit to unit.
             run_offsets: what differs from run to run.
-            regimes: when the plant does what; None: no regimes.
             executor: simulates candidates side by side: processes for a simulator that can be pickled,
                 threads for one that waits for another program; None: one after the other.
         """
@@ -77,7 +72,7 @@ class BlackBoxPlant:
         self.tolerances, self.run_offsets = tuple(tolerances), tuple(run_offsets)
         self.equations: Sequence[StateEquation] = ()
         self._simulation = _Simulation(simulate=simulate, channels=len(self.channels))
-        self._regimes, self._executor = regimes, executor
+        self._executor = executor
 
     def with_runs(self, runs: Sequence[Run]) -> "BlackBoxPlant":
         """The plant with other readings and inputs of its runs; nothing else of them changes."""
@@ -96,7 +91,7 @@ class BlackBoxPlant:
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: inputs and model outputs, (samples,) [SI], as states are unknown."""
-        outputs = self._first(values, run)
+        outputs = self._simulation(self._candidate(values, 0, run), self.runs[run])
         inputs = {
             name: StateTrace(unit="SI", scale=1.0, values=np.asarray(signal, dtype=float))
             for name, signal in self.runs[run].inputs.items()
@@ -107,8 +102,8 @@ class BlackBoxPlant:
         }
 
     def regimes(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, NDArray]:
-        """`GreyBox.regimes`: boolean (samples,) by name, as the owner's function gives them."""
-        return self._regimes(self.runs[run], self._first(values, run)) if self._regimes else {}
+        """`GreyBox.regimes`: none."""
+        return {}
 
     def forced(self, values: Mapping[str, NDArray], run: int, forcing: Mapping[str, NDArray]) -> NDArray:
         """`GreyBox.forced`, (channels, samples, m): refused, as no equation is known.
@@ -129,10 +124,6 @@ class BlackBoxPlant:
         nominal |= {p.symbol: p.nominal for p in (*sizes, *self.parameters)}
         given = {s: float(v[i, run] if np.ndim(v) == 2 else v[i]) for s, v in values.items()}
         return nominal | given
-
-    def _first(self, values: Mapping[str, NDArray], run: int) -> NDArray:
-        """Outputs (channels, samples) [SI] of the first candidate."""
-        return self._simulation(self._candidate(values, 0, run), self.runs[run])
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -37,16 +37,8 @@ from identification.gap.plant import GreyBox
 from identification.gap.plant_checks import check, check_description
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
-from identification.gap.search.cause_search import MOST_CAUSES, HypothesisPool, is_small, search_causes
+from identification.gap.search.cause_search import HypothesisPool, is_small, search_causes
 from identification.gap.search.screening import assess_separability, simulate_signatures
-
-JUDGED_RUNNERS_UP = 3
-"""Single causes beyond the ambiguity set whose discrepancy reduction is measured too; computing time and
-length of the tables."""
-
-HELPFUL_SHARE = 0.5
-"""Share of the gap on held-out recordings [1]: a cause that surely closes it is to be added, whether its
-name is sure or not."""
 
 NOTICED_WORSENING = 0.05
 """Relative growth of the held-out gap by recalibration that is mentioned [1]."""
@@ -99,10 +91,13 @@ class Diagnosis:
 
     @property
     def advised(self) -> RankedCause | None:
-        """The cause to add: the named one where it surely helps, else one that halves the gap."""
+        """The cause to add: the named one where it surely helps, else one that surely halves the gap.
+
+        The latter is to be added whether its name is sure or not.
+        """
         if self.named:
             return self.named if self.surely_helps(self.named) else None
-        helping = [cause for cause in self.judged if self.share_closed(cause).low >= HELPFUL_SHARE]
+        helping = [cause for cause in self.judged if self.share_closed(cause).low >= 0.5]
         return max(helping, key=lambda cause: self.share_closed(cause).value, default=None)
 
     @property
@@ -170,19 +165,16 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
     )
 
 
-def rank_hypotheses(
-    plant: GreyBox, cache: FitCache | None = None, most_causes: int = MOST_CAUSES
-) -> Ranking:
+def rank_hypotheses(plant: GreyBox, cache: FitCache | None = None) -> Ranking:
     """Refit the promising hypotheses and weigh them; a fit that does not converge is weighed as it is.
 
     Args:
         plant: the model, its recordings and its catalogue of causes.
         cache: runs the fits; None keeps nothing.
-        most_causes: largest number of causes that are taken to act together.
     """
     cache, plant = cache or FitCache(plant), prepared(plant)
     problem, base = recalibrated_by_seen_noise(plant, cache)
-    ranking = _searched(problem, base, cache, most_causes)
+    ranking = _searched(problem, base, cache)
     if not any(own.ripple for own in ranking.noise):
         return ranking
     foreseen = predictable_shares(problem, ranking.best.estimate)
@@ -190,7 +182,7 @@ def rank_hypotheses(
     if weighted is problem.plant:
         return ranking
     cache, thorough = cache.named("with the ripple filtered: "), is_small(plant)
-    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache, most_causes)
+    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache)
 
 
 def recalibrated_by_seen_noise(plant: GreyBox, cache: FitCache) -> tuple[FittingProblem, Estimate]:
@@ -203,7 +195,7 @@ def recalibrated_by_seen_noise(plant: GreyBox, cache: FitCache) -> tuple[Fitting
     return recalibrate(corrected, cache, thorough=thorough, prefix="with the noise seen: ")
 
 
-def _searched(problem: FittingProblem, base: Estimate, cache: FitCache, most_causes: int) -> Ranking:
+def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranking:
     """The search for causes beside the recalibrated model `base`; the most probable hypotheses first."""
     runs = linearise(problem, [base], problem.all_runs)[0]
     base_runs = [runs[r] for r in problem.fitted_runs]
@@ -212,7 +204,7 @@ def _searched(problem: FittingProblem, base: Estimate, cache: FitCache, most_cau
     evaluated = evaluate_linearised(problem, base, runs)
     recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
     pool = HypothesisPool(problem, recalibrated, cache)
-    search_causes(pool, base, signatures, most_causes)
+    search_causes(pool, base, signatures)
     return Ranking(
         problem=problem, recalibrated=recalibrated, separability=separability, **vars(pool.posterior())
     )
@@ -224,11 +216,11 @@ def _locate(ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int) -> Loc
 
 
 def _judged_causes(ranking: Ranking) -> list[RankedCause]:
-    """The fewest causes that hold most of the probability of all, and the next single ones."""
+    """The fewest causes that hold most of the probability of all, and the next three single ones."""
     causes = causes_by_name(ranking)
     first = max(len(smallest_set(causes, AMBIGUITY_SHARE)), 1)
     singles = [cause for cause in causes[first:] if len(cause.effects) == 1]
-    return [*causes[:first], *singles[:JUDGED_RUNNERS_UP]]
+    return [*causes[:first], *singles[:3]]
 
 
 def _worse_by_recalibration(reduction: DiscrepancyReduction) -> list[str]:

@@ -5,7 +5,6 @@ input over a sub-step is taken from the input's integral. Without a delay it is 
 is a smooth function of the delay, as a fit needs it. Before the run the first sample holds.
 """
 
-import contextlib
 import keyword
 from collections import namedtuple
 from collections.abc import Callable, Sequence
@@ -19,10 +18,6 @@ from numpy.typing import NDArray
 
 from identification.gap.fit.laws import KNOTS, MOST_LAWS
 from identification.gap.runge_kutta import advancing
-
-STEP_ERROR = 0.05
-"""Largest change of a reading by halving the sub-steps [noise deviations]: far below what the readings
-can show."""
 
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
@@ -61,13 +56,13 @@ class Records:
         states: Sequence[str],
         inputs: Sequence[str],
         symbols: Sequence[str],
-        nominal: Sequence[float] = (),
-        owners: Sequence[int] = (),
+        nominal: Sequence[float],
+        owners: Sequence[int],
     ):
         """nominal, owners: value [SI] and number of the cause of each symbol, from 1 on; 0: none."""
         self.states, self.inputs, self.symbols = tuple(states), tuple(inputs), tuple(symbols)
-        self.nominal = np.array(nominal or [0.0] * len(symbols), dtype=float)
-        self.owners = np.array(owners or [0] * len(symbols), dtype=np.int64)
+        self.nominal = np.array(nominal, dtype=float)
+        self.owners = np.array(owners, dtype=np.int64)
         self.x = record("state", self.states)
         self.u = record("input", (TIME, *self.inputs))
         self.p = record("parameter", self.symbols)
@@ -122,11 +117,6 @@ class Records:
 def compiled(function: Callable) -> Callable:
     """The function compiled by numba; divisions by zero give inf, as in numpy."""
     return function if hasattr(function, "py_func") else numba.njit(error_model="numpy")(function)
-
-
-def totals(samples: NDArray) -> NDArray:
-    """Integrals of held samples (samples, inputs) [sampling periods], (samples + 1, inputs)."""
-    return np.concatenate([np.zeros((1, *samples.shape[1:])), np.cumsum(samples, axis=0)])
 
 
 def delayed_mean(total: NDArray, since: float, length: float) -> float:
@@ -209,22 +199,28 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
         n, work = job.start.shape[1], np.empty((6, len(job.start)))
         states = np.full((n, len(job.start), len(job.inputs)), np.nan)
         readings = np.full((n, channels, len(job.inputs)), np.nan)
-        total = totals(job.inputs)
+        # Integrals of the held inputs [sampling periods], (samples + 1, inputs).
+        total = np.vstack([np.zeros((1, job.inputs.shape[1])), np.cumsum(job.inputs, axis=0)])
         starts, delays, parameters = (
             np.ascontiguousarray(own.T) for own in (job.start, job.delays, job.parameters)
         )
         pushes = np.ascontiguousarray(np.moveaxis(job.push, -1, 0))
         for c in range(n):
             given = starts[c], job.inputs, total, delays[c], parameters[c], job.period, job.steps
-            # Functions such as math.exp refuse what numpy calls inf: the candidate ends there.
-            with contextlib.suppress(ArithmeticError):
+            try:
                 loop(*given, pushes[c], work, states[c], readings[c])
+            except ArithmeticError:
+                continue  # functions such as math.exp refuse what numpy calls inf
+            except NumbaError as error:
+                lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
+                reason = next((line for line in lines if "Failed in" not in line), lines[0])
+                raise ValueError(
+                    f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
+                    "numbers, numpy and functions under numba.njit only, or choose mode='python'"
+                ) from error
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
 
     return simulate
-
-
-MODES = ("compiled", "python")
 
 
 def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode: str) -> Simulation:
@@ -233,35 +229,18 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     Args:
         records: the plant's names.
         functions: rate, readings and thresholds of records, each with its number of results.
-        mode: one of MODES.
+        mode: "compiled" or "python".
 
     Raises:
         ValueError: for another mode, and at the first simulation for functions that numba refuses.
     """
-    if mode not in MODES:
-        raise ValueError(f"mode '{mode}' is none of {', '.join(MODES)}: choose one of them")
+    if mode not in ("compiled", "python"):
+        raise ValueError(f"mode '{mode}' is none of compiled, python: choose one of them")
     own: Callable = compiled if mode == "compiled" else lambda function: function
     rate, read, thresholds = (own(records.flat(own(f), results, own)) for f, results in functions)
     channels, count = functions[1][1], functions[2][1]
     advance = advancing(rate, thresholds, count, own)
-    return _explained(alone(advance, read, channels, own))
-
-
-def _explained(simulation: Simulation) -> Simulation:
-    """The simulation; where numba refuses a function, the error says what to do."""
-
-    def simulate(job: Job) -> tuple[NDArray, NDArray]:
-        try:
-            return simulation(job)
-        except NumbaError as error:
-            lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
-            reason = next((line for line in lines if "Failed in" not in line), lines[0])
-            raise ValueError(
-                f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
-                "numbers, numpy and functions under numba.njit only, or choose mode='python'"
-            ) from error
-
-    return simulate
+    return alone(advance, read, channels, own)
 
 
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:
@@ -275,16 +254,13 @@ def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:
     while 2 * steps <= MOST_STEPS:
         fine = read(2 * steps)
         finite = all(np.all(np.isfinite(reading[..., 0])) for reading in fine)
-        if finite and _largest_change(coarse, fine) <= STEP_ERROR:
+        # Where only the fine one is finite, the change is infinite.
+        changes = [
+            np.where(np.isfinite(b), np.nan_to_num(np.abs(b - a), nan=np.inf), 0.0)
+            for a, b in zip(coarse, fine, strict=True)
+        ]
+        # Noise deviations: far below what the readings can show.
+        if finite and max(np.max(change) for change in changes) <= 0.05:
             return steps
         steps, coarse = 2 * steps, fine
     return steps
-
-
-def _largest_change(coarse: Sequence[NDArray], fine: Sequence[NDArray]) -> float:
-    """Largest difference of readings [noise deviations]; infinity where only the fine one is finite."""
-    changes = [
-        np.where(np.isfinite(b), np.nan_to_num(np.abs(b - a), nan=np.inf), 0.0)
-        for a, b in zip(coarse, fine, strict=True)
-    ]
-    return float(max(np.max(change) for change in changes))

@@ -86,15 +86,31 @@ class OdePlant:
         self.parameters, self.causes = tuple(parameters), tuple(causes)
         self.run_offsets, self.tolerances = tuple(run_offsets), tuple(tolerances)
         self.nominal = _nominal_values(parameters, causes, (*run_offsets, *tolerances))
+        # All variants of a cause share its law.
+        numbers = {name: n for n, name in enumerate(dict.fromkeys(c.name for c in self.causes), start=1)}
+        owners = {p.symbol: numbers[cause.name] for cause in self.causes for p in cause.parameters}
         self._records = Records(
-            states, inputs, tuple(self.nominal), [*self.nominal.values()], self._owners()
+            states,
+            inputs,
+            tuple(self.nominal),
+            [*self.nominal.values()],
+            [owners.get(symbol, 0) for symbol in self.nominal],
         )
         self.law_arguments = tuple(states)
         self._start, self._regimes = start, regimes
-        self._rate, self._read = rate, readings
         self._delays = dict(delays or {})
         self._units = dict.fromkeys((*states, *inputs), ("", 1.0)) | dict(units or {})
-        self.equations = self._state_equations(components or {}, forcing_steps or {})
+        self.equations = tuple(
+            StateEquation(
+                name=f"d{name}/dt",
+                state=name,
+                component=(components or {}).get(name, name),
+                unit=f"{self._units[name][0] or '1'}/s",
+                scale=self._units[name][1],
+                step=(forcing_steps or {}).get(name, 0.0),
+            )
+            for name in self._records.states
+        )
         self._check_names({"components": components, "forcing_steps": forcing_steps})
         count = self._thresholds(rate, readings, thresholds)
         none = thresholds or (lambda x, u, p: ())
@@ -120,14 +136,6 @@ class OdePlant:
         every = (*self._records.states, *self._records.inputs)
         numbers = (place, every.index(argument) + 1, low, high, *growth)
         return {f"law {number}, {row}": float(value) for row, value in enumerate(numbers)}
-
-    def _owners(self) -> list[int]:
-        """Number of the cause of each symbol, from 1 on, one for all variants; 0 for no cause."""
-        numbers = {name: n for n, name in enumerate(dict.fromkeys(c.name for c in self.causes), start=1)}
-        owners = dict.fromkeys(self.nominal, 0)
-        for cause in self.causes:
-            owners |= {p.symbol: numbers[cause.name] for p in cause.parameters}
-        return list(owners.values())
 
     def states(self, values: Mapping[str, NDArray], run: int) -> Mapping[str, StateTrace]:
         """`GreyBox.states`: states and inputs, values (samples,) [SI]."""
@@ -194,22 +202,6 @@ class OdePlant:
                 given = np.asarray(values[symbol])
                 p[i] = given[:, run] if given.ndim == 2 else given
         return p
-
-    def _state_equations(
-        self, components: Mapping[str, str], forcing_steps: Mapping[str, float]
-    ) -> tuple[StateEquation, ...]:
-        """One equation for each state."""
-        return tuple(
-            StateEquation(
-                name=f"d{name}/dt",
-                state=name,
-                component=components.get(name, name),
-                unit=f"{self._units[name][0] or '1'}/s",
-                scale=self._units[name][1],
-                step=forcing_steps.get(name, 0.0),
-            )
-            for name in self._records.states
-        )
 
     def _check_names(self, by_state: Mapping[str, Mapping[str, Any] | None]) -> None:
         """Raises ValueError for a name that is no state, no input or no symbol."""

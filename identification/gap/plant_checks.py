@@ -22,23 +22,6 @@ from identification.gap.prepare.screened import sentences
 UNEVEN_PERIOD = 0.01
 """Largest deviation from uniform sampling [sampling periods]: rounding of a logger's clock."""
 
-MOST_JUMPS = 0.1
-"""Share of samples at which a clock may jump and be called uniform elsewhere [1]."""
-
-TRIAL_STEP = 0.05
-"""Change of a calibrated parameter that must show in the outputs, as a share of its range [1]: far
-beyond rounding, and small enough that the model can be simulated."""
-
-LEAST_EFFECT = 1e-9
-"""Change of the outputs that is no effect, relative to their magnitude [1]: rounding."""
-
-SIDE_BY_SIDE_ERROR = 1e-3
-"""Largest difference between a candidate alone and the same one beside another, relative to the outputs'
-magnitude [1]: a solver whose steps candidates share differs by less, mixed-up candidates by more."""
-
-ALIKE = 0.999
-"""Correlation of the changes by two parameters [1] from which recordings determine one number only."""
-
 
 def check_description(plant: GreyBox) -> None:
     """Look for mistakes in the description of a plant and in the form of its recordings.
@@ -130,7 +113,7 @@ def _time_faults(time: NDArray) -> Iterator[str]:
     steps = np.diff(time)
     usual = float(np.median(steps))
     jumps = np.flatnonzero(np.abs(steps - usual) > 2 * UNEVEN_PERIOD * usual) + 1
-    if usual > 0 and 0 < len(jumps) < MOST_JUMPS * len(time):
+    if usual > 0 and 0 < len(jumps) < 0.1 * len(time):
         yield (
             f"time jumps by {steps[jumps[0] - 1]:g} s at sample {jumps[0]}, where the period is "
             f"{usual:g} s: cut the run there into two runs"
@@ -223,7 +206,7 @@ def _trials(plant: GreyBox) -> dict[str, dict[str, float]]:
     """Values [SI] by symbol of a candidate off nominal, by the parameter or cause that it tries."""
     found = {}
     for p in plant.parameters:
-        step = TRIAL_STEP * (p.high - p.low)
+        step = 0.05 * (p.high - p.low)  # far beyond rounding, and the model can still be simulated
         value = p.nominal + (step if p.nominal + step <= p.high else -step)
         found[f"parameters, {p.symbol}"] = {p.symbol: value}
     for cause in plant.causes:
@@ -279,7 +262,8 @@ def _output_faults(plant: GreyBox) -> Iterator[str]:
                 f"outputs: run {run.name}, channel {channel} is not finite at sample {sample} at the "
                 "nominal values: correct the model or the values, or leave the run out"
             )
-        elif np.any(run.trusted & ~(error <= SIDE_BY_SIDE_ERROR)):
+        # A solver whose steps candidates share differs by less, mixed-up candidates by more.
+        elif np.any(run.trusted & ~(error <= 1e-3)):
             yield (
                 f"outputs: run {run.name} of the nominal candidate changes beside another one: keep "
                 "candidates apart along the last axis, and let no cause act at its nominal value"
@@ -321,7 +305,7 @@ def _effect_warnings(plant: GreyBox) -> list[str]:
     doubtful, alike = np.arange(len(trials)), gram > 0
     for run in sorted(range(len(plant.runs)), key=lambda r: len(plant.runs[r].time)):
         changes = _changes(plant, [trials[members[i]] for i in doubtful], run)
-        seen[doubtful] |= np.max(np.abs(changes), axis=0, initial=0.0) > LEAST_EFFECT
+        seen[doubtful] |= np.max(np.abs(changes), axis=0, initial=0.0) > 1e-9  # rounding
         gram[np.ix_(doubtful, doubtful)] += changes.T @ changes
         alike = _alike(gram, calibrated)
         doubtful = np.flatnonzero(~seen | np.any(alike, axis=1))
@@ -352,4 +336,4 @@ def _alike(gram: NDArray, calibrated: NDArray) -> NDArray:
     size = np.sqrt(np.diag(gram))
     counts = calibrated & (size > 0)
     correlation = np.abs(gram) / np.maximum(np.outer(size, size), np.finfo(float).tiny)
-    return np.outer(counts, counts) & ~np.eye(len(gram), dtype=bool) & (correlation > ALIKE)
+    return np.outer(counts, counts) & ~np.eye(len(gram), dtype=bool) & (correlation > 0.999)

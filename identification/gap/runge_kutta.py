@@ -9,15 +9,9 @@ from collections.abc import Callable
 
 import numpy as np
 
-APPROACH_FACTOR = 8.0
-"""By what a sub-step is divided when it would pass a threshold; computing time only."""
-
 SHORTEST_STEP = 1e-8
 """Sub-step at which a threshold is passed, relative to the ordinary sub-step [1]: a threshold is located
 to this accuracy, well above rounding."""
-
-MOST_EVENT_STEPS = 600
-"""Most steps within one sub-step near thresholds; ten crossings in one sub-step fit in."""
 
 
 def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) -> Callable:
@@ -93,13 +87,13 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
             slope(x, t, u, p, push, work[0])
             x += tiny * work[0]
             thresholds(x, t, u, p, before)
-        for _ in range(MOST_EVENT_STEPS):
+        for _ in range(600):  # in which ten crossings find room
             size = min(size, left)
             if try_step(x, t, size, u, p, push, before, level, work):
                 x[:] = work[5]
                 t, left = t + size, left - size
             elif size > tiny:
-                size = max(size / APPROACH_FACTOR, tiny)
+                size = max(size / 8.0, tiny)
                 continue
             elif pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
                 return

@@ -30,16 +30,11 @@ PLANT_FILE = "plant.json"
 """Name of the file of the calibrated plant in the folder of results."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Result:
-    """What a stage gives to the report and to the JSON file."""
-
-    sections: list[Section]
-    content: dict[str, Any]
-    """Fields of the JSON file."""
+Result = tuple[list[Section], dict[str, Any]]
+"""What a stage gives to the report, and fields of the JSON file."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Stage:
     """One stage of the identification."""
 
@@ -69,10 +64,8 @@ def quality(identification: Identification) -> Result:
         assess_recording(recording, campaign.pressure, steps=steps, sensors=campaign.rules.sensors)
         for recording in recordings
     ]
-    return Result(
-        sections=[quality_section(assessment) for assessment in assessments],
-        content={"quality": [quality_json(assessment) for assessment in assessments]},
-    )
+    content = {"quality": [quality_json(assessment) for assessment in assessments]}
+    return [quality_section(assessment) for assessment in assessments], content
 
 
 def sensitivity(identification: Identification) -> Result:
@@ -81,44 +74,36 @@ def sensitivity(identification: Identification) -> Result:
     replay, symbols = problem.least_squares().replay, studied_symbols()
     outputs = sensitivities_on_recordings(replay, symbols, problem.noise)
     errors = sensitivities(Parameters.nominal(), symbols)
-    return Result(
-        sections=[sensitivity_section(errors, outputs)],
-        content={"sensitivity": sensitivity_json(errors, outputs)},
-    )
+    content = {"sensitivity": sensitivity_json(errors, outputs)}
+    return [sensitivity_section(errors, outputs)], content
+
+
+def calibration(identification: Identification) -> Result:
+    """Section 6.2: both methods from every start."""
+    fitted = identification.calibration
+    return [calibration_section(fitted)], {"calibration": calibration_json(fitted)}
+
+
+def confidence(identification: Identification) -> Result:
+    """Section 6.3: intervals and joint region."""
+    sure = identification.confidence
+    return [confidence_section(sure)], {"confidence": confidence_json(sure)}
+
+
+def validation(identification: Identification) -> Result:
+    """Section 7 on held-out recordings. Raises CampaignError if there is none."""
+    checked = identification.validation
+    return [validation_section(checked)], {"validation": validation_json(checked)}
 
 
 STAGES = (
+    Stage("quality", "is the data good enough (section 4)", quality, 0.24, role="quality"),
+    Stage("sensitivity", "which parameters matter (section 5)", sensitivity, 0.04),
+    Stage("calibrate", "fit the parameters (section 6.2)", calibration, 0.4),
+    Stage("confidence", "how sure the estimates are (section 6.3)", confidence, 0.16),
     Stage(
-        name="quality", help="is the data good enough (section 4)",
-        compute=quality, time_share=0.24, role="quality",
-    ),
-    Stage(
-        name="sensitivity", help="which parameters matter (section 5)",
-        compute=sensitivity, time_share=0.04,
-    ),
-    Stage(
-        name="calibrate", help="fit the parameters (section 6.2)",
-        compute=lambda i: Result(
-            sections=[calibration_section(i.calibration)],
-            content={"calibration": calibration_json(i.calibration)},
-        ),
-        time_share=0.4,
-    ),
-    Stage(
-        name="confidence", help="how sure the estimates are (section 6.3)",
-        compute=lambda i: Result(
-            sections=[confidence_section(i.confidence)],
-            content={"confidence": confidence_json(i.confidence)},
-        ),
-        time_share=0.16,
-    ),
-    Stage(
-        name="validate", help="does the model hold on held-out recordings (section 7)",
-        compute=lambda i: Result(
-            sections=[validation_section(i.validation)],
-            content={"validation": validation_json(i.validation)},
-        ),
-        time_share=0.16, role="validation",
+        "validate", "does the model hold on held-out recordings (section 7)", validation, 0.16,
+        role="validation",
     ),
 )  # fmt: skip
 """In the order of the report."""
@@ -130,9 +115,7 @@ def result_or_omission(stage: Stage, identification: Identification) -> Result:
         return stage.compute(identification)
     text = f"The campaign has no recording with role {stage.role!r}: this stage was left out."
     verdict = Verdict(status="doubt", text=text)
-    return Result(
-        sections=[Section(title=f"Not done: {stage.name}", verdicts=[verdict], blocks=[])], content={}
-    )
+    return [Section(title=f"Not done: {stage.name}", verdicts=[verdict])], {}
 
 
 def run(identification: Identification, out: Path, next_step: NextStep) -> Plant:
@@ -142,23 +125,22 @@ def run(identification: Identification, out: Path, next_step: NextStep) -> Plant
     to fit to.
     """
     began, done = perf_counter(), 0.0
-    results: list[Result] = []
+    sections: list[Section] = []
+    content: dict[str, Any] = {}
     for number, stage in enumerate(STAGES, start=1):
         seconds = perf_counter() - began
         left = f", about {seconds * (1 - done) / done:.0f} s left" if done else ""
         print(f"[{number}/{len(STAGES)}] {stage.name}{left}", file=sys.stderr)
-        results.append(result_or_omission(stage, identification))
+        shown, fields = result_or_omission(stage, identification)
+        sections, content = [*sections, *shown], content | fields
         done += stage.time_share
     plant = calibrated_plant(identification)
-    content: dict[str, Any] = {"provenance": plant.provenance}
-    for result in results:
-        content |= result.content
     write_results(
         out,
         "report",
+        {"provenance": plant.provenance, **content},
         title=f"Identification of the protection valve: {identification.campaign.name}",
-        sections=[summary_section(identification), *(s for r in results for s in r.sections)],
-        content=content,
+        sections=[summary_section(identification), *sections],
         facts=campaign_facts(identification.campaign),
         next_step=next_step,
     )

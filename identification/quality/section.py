@@ -1,35 +1,25 @@
 """The quality of one recording in a report: verdicts, tables, the readings, and JSON."""
 
 import math
-from dataclasses import asdict
+from dataclasses import asdict, fields
 from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from identification.quality.assessment import QualityAssessment, sensor_offsets, white_noise_band
+from identification.quality.channel import DescriptiveStatistics
 from identification.quality.verdicts import channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS
-from identification.report.page import Picture, Section, Table, Text
+from identification.report.page import Picture, Section, Table
+from identification.report.signals import over_time
 
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
 
 
-STATISTIC_NAMES = {
-    "arithmetic_mean": "arithmetic mean",
-    "trimmed_mean": "trimmed mean [by 5 %]",
-    "median": "median",
-    "standard_deviation": "standard deviation",
-    "interquartile_range": "interquartile range",
-    "absolute_deviation": "absolute deviation",
-    "range": "range",
-    "signal_to_noise": "SNR [dB]",
-    "outlier_factor": "outlier factor",
-    "kurtosis": "kurtosis",
-    "skewness": "skewness",
-}
-"""Names by field of `DescriptiveStatistics`."""
+OTHER_NAMES = {"trimmed_mean": "trimmed mean [by 5 %]", "signal_to_noise": "SNR [dB]"}
+"""Of statistics that people call otherwise than their fields."""
 
 
 def quality_section(quality: QualityAssessment) -> Section:
@@ -38,7 +28,7 @@ def quality_section(quality: QualityAssessment) -> Section:
         title=f"Data quality: {quality.name} ({quality.samples} samples)",
         verdicts=[channel_verdict(quality, name) for name in CHANNELS],
         blocks=[
-            Text(text=_state(quality)),
+            _state(quality),
             _trends(quality),
             _statistics(quality),
             _correlations(quality),
@@ -49,16 +39,17 @@ def quality_section(quality: QualityAssessment) -> Section:
 
 def signals(quality: QualityAssessment) -> Figure:
     """Readings over time, with the line of the trend (Figure 4)."""
-    figure = Figure(figsize=(9, 7.5), layout="constrained")
-    rows = figure.subplots(len(quality.channels), 1, sharex=True)
     time = np.arange(quality.samples) * quality.period
-    for axes, channel in zip(rows, quality.channels.values(), strict=True):
-        axes.plot(time, channel.readings, color="tab:blue", linewidth=0.3)
-        axes.plot(time[[0, -1]], channel.trend.at(time[[0, -1]]), color="tab:red", linewidth=1.0)
-        axes.set_ylabel(f"{channel.name} [{channel.unit}]")
-    rows[-1].set_xlabel("time [s]")
-    figure.align_ylabels()
-    return figure
+    return over_time(
+        time,
+        {
+            f"{channel.name} [{channel.unit}]": {
+                "readings": channel.readings,
+                "trend": channel.trend.at(time),
+            }
+            for channel in quality.channels.values()
+        },
+    )
 
 
 def _state(quality: QualityAssessment) -> str:
@@ -92,9 +83,10 @@ def _estimate(value: float, error: float) -> str:
 
 def _statistics(quality: QualityAssessment) -> Table:
     rows = []
-    for field, label in STATISTIC_NAMES.items():
+    for field in (each.name for each in fields(DescriptiveStatistics)):
         values = [getattr(quality.channels[name].description, field) for name in CHANNELS]
         digits = ".2f" if field == "signal_to_noise" else "z.4f"
+        label = OTHER_NAMES.get(field, field.replace("_", " "))
         rows.append([label, *(format(v, digits) if math.isfinite(v) else "–" for v in values)])
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],

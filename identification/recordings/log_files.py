@@ -172,8 +172,10 @@ def _check_reference(
     ambient: p_env [bar absolute].
     """
     parts = [(own, part) for own in drives for part in _openings(own["coil"], own["p3_bar"], period)]
-    p3 = np.concatenate([np.empty(0), *(own["p3_bar"][part] for own, part in parts)])
-    on = np.concatenate([np.empty(0), *(own["coil"][part] for own, part in parts)]) > 0.0
+    if not parts:
+        return
+    p3 = np.concatenate([own["p3_bar"][part] for own, part in parts])
+    on = np.concatenate([own["coil"][part] for own, part in parts]) > 0.0
     for found in gauge_contradiction(p3, on, ambient, LEAST_FALLING):
         raise CampaignError(
             f"{folder}: {found}: p1_bar, p2_bar and p3_bar look like gauge pressure: give bar absolute "

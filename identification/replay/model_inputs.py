@@ -17,19 +17,8 @@ from scipy.stats import chi2
 from identification.readings_noise import quantisation_step, rounding_error
 from identification.recordings.recording import HOLD, Recording
 
-SMOOTHING_WINDOW = 0.01
-"""Window in which p2 is smoothed before the air drawn from the supply is read off p2 [s]."""
-
 BLOCK = 0.02
 """Length of the blocks over which what remains of a signal must average out [s]."""
-
-WHITE_PROBABILITY = 1e-4
-"""Probability, as white noise, of what remains of a signal below which no simple course replaces the
-signal."""
-
-ROUNDING_MARGIN = 1.4
-"""Scatter over a rounding error up to which rounding explains what remains of a signal: readings that
-waver between two codes reach 1.7, and the noise of fine steps lies far beyond."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +82,8 @@ def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """
     fitted = _air_balance(recording, p)
     residual = recording.p1 - fitted
-    rounding = ROUNDING_MARGIN * rounding_error(quantisation_step([recording.p1], fewest=1))
+    # Readings that waver between two codes scatter by up to 1.7 rounding errors, fine steps far more.
+    rounding = 1.4 * rounding_error(quantisation_step([recording.p1], fewest=1))
     if _is_white(residual, recording.period) or np.sqrt(np.mean(residual**2)) <= rounding:
         return fitted
     return _spline(recording)
@@ -110,7 +100,8 @@ def _air_balance(recording: Recording, p: Mapping[str, float]) -> NDArray:
 
     That is what the circuit holds and has consumed, and what has filled the control chamber [kg].
     """
-    samples = min(2 * round(0.5 * SMOOTHING_WINDOW / recording.period) + 1, len(recording) // 2 * 2 - 1)
+    # p2 is smoothed over 10 ms before the air drawn from the supply is read off it.
+    samples = min(2 * round(0.5 * 0.01 / recording.period) + 1, len(recording) // 2 * 2 - 1)
     p2, p3 = np.asarray(savgol_filter([recording.p2, recording.p3], samples, 1))
     filling = np.cumsum(np.diff(p3, prepend=p3[0]) * recording.energised)
     stored = (p["V2"] * p2 + p["V3"] * filling) / (p["R_gas"] * p["T_env"])
@@ -129,7 +120,7 @@ def _is_white(residual: NDArray, period: float) -> bool:
     blocks = residual[: len(residual) // length * length].reshape(-1, length)
     variance = 0.5 * np.mean(np.diff(residual) ** 2)
     statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
-    return bool(statistic <= variance * chi2.isf(WHITE_PROBABILITY, len(blocks)))
+    return bool(statistic <= variance * chi2.isf(1e-4, len(blocks)))
 
 
 def _spline(recording: Recording) -> NDArray:

@@ -23,9 +23,6 @@ P2_SHIFT, FLOW_SHIFT, FLOW_RAMP = SHIFTS = "p2_start", "consumption", "consumpti
 """What a candidate may change of a recording: p2 at the start [Pa], the air consumed [kg/s], and its
 change from the first sample to the last [kg/s], about the middle."""
 
-RECORDED_PERIODS = 100
-"""Sampling periods whose states are kept at a time: few enough to stay in the processor's cache."""
-
 
 class Replay:
     """Simulates recordings under candidate parameters."""
@@ -156,8 +153,8 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
     steps = len(duration)
     outputs = np.empty((len(OUTPUTS), 1 + steps, valves.n))
     outputs[:, 0] = _read(valves.state, tiled)
-    # A delayed voltage needs the whole record at once.
-    together = steps if np.any(tiled["t_delay"]) else RECORDED_PERIODS
+    # A delayed voltage needs the whole record at once; else states stay in the processor's cache.
+    together = steps if np.any(tiled["t_delay"]) else 100
     for first in range(0, steps, max(together, 1)):
         part = slice(first, first + together)
         own = {name: np.repeat(field[part], n, axis=1) for name, field in inputs.items()}

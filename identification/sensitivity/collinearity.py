@@ -21,14 +21,8 @@ DIFFERENCE_STEP = 2e-3
 """Step of the central differences: in the logarithm of a value; in half widths of the domain where the
 value is zero."""
 
-STATED_CHANGE = 0.1
-"""Change for which effects are stated, in the measure of `DIFFERENCE_STEP`: that of Table 8."""
-
 CRITICAL_INDEX = 10.0
 """Collinearity index from which parameters are poorly identifiable (Brun et al.: 10 to 15)."""
-
-ZERO_EIGENVALUE = 1e-12
-"""A least eigenvalue below this is zero within the accuracy of the differences."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +57,7 @@ def cosines(columns: NDArray) -> NDArray:
 def collinearity_index(columns: NDArray) -> float:
     """Brun et al.'s index of columns (samples, n) [any unit]: between 1 and infinity."""
     least = np.linalg.eigvalsh(cosines(columns))[0]
-    return float(1 / np.sqrt(least)) if least > ZERO_EIGENVALUE else np.inf
+    return float(1 / np.sqrt(least)) if least > 1e-12 else np.inf  # but for rounding
 
 
 def stepped(symbol: str, value: float) -> NDArray:
@@ -82,12 +76,12 @@ def sensitivities_on_recordings(
 ) -> OutputSensitivities:
     """How the outputs respond on recorded inputs, in units of the measured noise by output [SI].
 
-    By central differences.
+    By central differences, stated for a change of 0.1, that of Table 8.
     """
     deviation = np.array([noise[name] for name in OUTPUTS])[:, None, None]
     width = 2 * DIFFERENCE_STEP * deviation
     columns = [
-        ((y[..., 1::2] - y[..., ::2]) * STATED_CHANGE / width).reshape(-1, len(symbols))
+        ((y[..., 1::2] - y[..., ::2]) * 0.1 / width).reshape(-1, len(symbols))
         for y in replay.outputs(_both_ways(replay.base, symbols))
     ]
     return OutputSensitivities(symbols=tuple(symbols), columns=np.concatenate(columns))

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import chi2
 
-from epv_env.common.command_line import NextStep, beside, plant_option
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal
 from epv_env.plant.effects.law import knot_symbols
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject, save_plant
@@ -29,13 +29,11 @@ from identification.gap.report.gap_json import fitted_values, parameter_covarian
 from identification.gap.report.page import sections
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts
-from identification.recordings.rules import RULES, rules_of
+from identification.recordings.rules import rules_of
 from identification.report.page import Section, write_page
 from identification.valve_gap.next_recording import CANDIDATES, NextRecording, next_recording
 from identification.valve_gap.next_recording import FILE_NAME as PROGRAMME
 from identification.valve_gap.valve import Valve
-
-GUIDE = "docs/explanation/diagnosis.md"
 
 REPORT, PLANT, JOURNAL = "report.html", "plant.json", "fits.jsonl"
 
@@ -65,7 +63,7 @@ def diagnose_campaign(
     """
     began = perf_counter()
     described = load_plant(plant) if plant else None
-    recorded = read_campaign(campaign, rules_of(described) if described else RULES)
+    recorded = read_campaign(campaign, rules_of(load_plant(plant)))
     valve = Valve(recorded, described, without=without, noise=noise)
     journal = Journal(out / JOURNAL, subject(valve, without, noise or {}))
     steps = steps_on_stderr(began) if report else lambda step: None
@@ -84,17 +82,14 @@ def diagnose_campaign(
 
 def next_step(verdict: str, campaign: Path, out: Path, plant: Path | None) -> NextStep:
     """What to run after a diagnosis that wrote into `out`; plant: that it began with."""
-    given = plant_option(plant)
     if verdict == AMBIGUOUS:
-        words = ("bench", "--programme", out / PROGRAMME, "--out", beside(out, "next"), *given)
-        return NextStep("to record what tells these causes apart", words)
+        words = ("bench", "--programme", out / PROGRAMME, "--out", beside(out, "next"))
+        return NextStep("to record what tells these causes apart", words, plant)
     if verdict == UNKNOWN:
         purpose = "once the missing effect is in the catalogue (docs/extending.md)"
-        return NextStep(purpose, ("gap", campaign, "--out", out, *given))
-    region = ("--plant", out / PLANT, "--parameters", "diagnosis")
-    return NextStep(
-        "to train a policy for this plant", ("train", *region, "--out", beside(out, "policy"))
-    )
+        return NextStep(purpose, ("gap", campaign, "--out", out), plant)
+    words = ("train", "--parameters", "diagnosis", "--out", beside(out, "policy"))
+    return NextStep("to train a policy for this plant", words, out / PLANT)
 
 
 def _plan(found: Diagnosis, valve: Valve, out: Path) -> NextRecording:
@@ -131,7 +126,6 @@ def write_report(
             more(found, corrected) if more else (),
         ),
         facts=facts,
-        footer=f"Written by epv-valve {version('epv-valve')}. Figures and fields: {GUIDE}.",
         next_step=step,
     )
 

@@ -9,7 +9,7 @@ import numpy as np
 from epv_env.common.units import BAR
 from identification.bench.programmes import Programme
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
-from identification.gap.judge.verdict import UNKNOWN, Ranking
+from identification.gap.judge.verdict import KNOWN, NO_GAP, UNKNOWN, Ranking
 from identification.gap.report.quantities import gap_text, listed, probability_text
 from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.model_inputs import ModelInputs
@@ -55,7 +55,7 @@ RUN = f"epv bench --programme {FILE_NAME} --out next"
 """Where the programme is kept, and how the bench runs it."""
 
 NOTHING_EXPLAINS = (
-    "No cause of the catalogue explains the recordings: look at the shape of the missing term first"
+    "No cause of the catalogue explains the recordings: look at the shape of the missing term first."
 )
 MOST_ROWS, COLUMNS = 5, ("Programme", "Separation [noise deviations]")
 """Of the table."""
@@ -77,32 +77,43 @@ def next_recording(
 ) -> NextRecording:
     """The programme, of these, that separates the two most probable answers most: causes, or no cause.
 
-    valve: the campaign that was diagnosed. verdict: of the diagnosis; what is unknown predicts nothing.
+    None where the verdict is certain. valve: the campaign that was diagnosed. verdict: of the diagnosis;
+    what is unknown predicts nothing.
     """
     if verdict == UNKNOWN or not ranking.hypotheses:
         return NextRecording(text=NOTHING_EXPLAINS)
-    answers = [each.estimate for each in (*ranking.hypotheses, ranking.recalibrated)]
+    answers = [hypothesis.estimate for hypothesis in (*ranking.hypotheses, ranking.recalibrated)]
     pairs = zip((*ranking.probabilities, ranking.no_cause), answers, strict=True)
     (probability, first), (_, second) = sorted(pairs, key=lambda pair: -pair[0])[:2]
-    found = separation(ranking.problem, planned(valve, programmes), first, second)
-    best = sorted(zip(programmes, found, strict=True), key=lambda pair: -pair[1])[:MOST_ROWS]
-    rows = [(described(programme), gap_text(apart)) for programme, apart in best]
-    titles = [" + ".join(each.hypothesis.titles) or "no cause" for each in (first, second)]
-    text = _sentence(rows[0][0], best[0][1], titles, probability)
-    return NextRecording(text=text, programme=best[0][0], table=Table(columns=COLUMNS, rows=rows))
+    one, other = (" + ".join(answer.hypothesis.titles) or "no cause" for answer in (first, second))
+    if probability > CERTAIN and verdict in (KNOWN, NO_GAP):
+        sure = f"{one}: {probability_text(probability)}"
+        return NextRecording(text=f"No further recording is needed ({sure}).")
+    separations = separation(ranking.problem, planned(valve, programmes), first, second)
+    ranked = sorted(zip(programmes, separations, strict=True), key=lambda pair: -pair[1])[:MOST_ROWS]
+    rows = [(described(programme), gap_text(apart)) for programme, apart in ranked]
+    (record, by), (programme, apart) = rows[0], ranked[0]
+    text = f"Record {record}: it separates {one} from {other} by {by} noise deviations ({RUN})."
+    if apart < APART:
+        text = (
+            f"No programme of the bench tells {one} from {other}: even the best, {record}, separates "
+            f"them by {by} noise deviations only ({RUN})."
+        )
+    return NextRecording(text=text, programme=programme, table=Table(columns=COLUMNS, rows=rows))
 
 
 def separation(problem: FittingProblem, plan: Valve, first: Estimate, second: Estimate) -> list[float]:
     """Root mean square difference of two estimates in each run, 0 where one fails [noise deviations]."""
     values = problem.candidates([first, second])
-    for own in (*first.hypothesis.run_parameters, *second.hypothesis.run_parameters):
-        values[own.symbol] = np.full(2, own.centre)  # what was fitted is of other recordings
+    for p in (*first.hypothesis.run_parameters, *second.hypothesis.run_parameters):
+        values[p.symbol] = np.full(2, p.centre)  # what was fitted is of other recordings
     noise = np.array([[channel.known_noise] for channel in problem.plant.channels])
-    found = []
+    separations = []
     for run, output in zip(plan.runs, plan.outputs(values, range(len(plan.runs))), strict=True):
         difference = (output[..., 1] - output[..., 0]) / noise
-        found.append(float(np.nan_to_num(np.sqrt(np.mean(difference[run.trusted] ** 2)), posinf=0.0)))
-    return found
+        apart = np.sqrt(np.mean(difference[run.trusted] ** 2))
+        separations.append(float(np.nan_to_num(apart, posinf=0.0)))
+    return separations
 
 
 def planned(valve: Valve, programmes: Sequence[Programme]) -> Valve:
@@ -135,15 +146,3 @@ def described(programme: Programme) -> str:
     openings = several if len(lengths) > 1 else f"one opening of {lengths[0]} ms"
     conditions = f"{programme.p1 / BAR:g} bar supply into {programme.p2 / BAR:g} bar"
     return f"{openings} from {conditions} at {programme.U_on:g} V, {case.duration:g} s in all"
-
-
-def _sentence(record: str, apart: float, titles: Sequence[str], probability: float) -> str:
-    """What to record, and how far apart the answers with these titles then are [noise deviations]."""
-    (first, second), by = titles, f"by {gap_text(apart)} noise deviations"
-    if probability > CERTAIN:
-        sure = f"{first}: {probability_text(probability)}"
-        return f"None is needed ({sure}); {record} would separate it from {second} best, {by} ({RUN})"
-    if apart < APART:
-        why = f"even the best, {record}, separates them {by} only ({RUN})"
-        return f"No candidate tells {first} and {second} apart: {why}"
-    return f"Record {record}: it separates {first} from {second} {by} ({RUN})"

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
-from epv_env.common.command_line import NextStep, plant_option
+from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant
 from identification.gap.diagnosis import Diagnosis, diagnose, recalibrated_by_seen_noise
@@ -31,7 +31,7 @@ from identification.gap.search.screening import simulate_signatures
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import drive_of, evenly, openings, start_of
 from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts
-from identification.recordings.rules import RULES, rules_of
+from identification.recordings.rules import rules_of
 from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
 from identification.valve_gap.diagnose import (
     JOURNAL,
@@ -74,8 +74,8 @@ def diagnose_log(
     file that is none.
     """
     began = perf_counter()
-    described = load_plant(plant) if plant else Plant.calibrated()
-    log = read_log(folder, rules_of(described) if plant else RULES)
+    described = load_plant(plant)
+    log = read_log(folder, rules_of(described))
     campaign, steady = steady_openings(log, described)
     valve = LoggedValve(campaign, described, steady, without)
     journal = Journal(out / JOURNAL, subject(valve, without, {}))
@@ -98,8 +98,7 @@ def diagnose_log(
 def next_step(verdict: str, folder: Path, out: Path, plant: Path | None) -> NextStep:
     """What to run after the diagnosis of a log; see `diagnose.next_step`."""
     if verdict in (AMBIGUOUS, UNKNOWN):
-        again = ("gap", folder, "--logs", "--out", out, *plant_option(plant))
-        return NextStep("once more drives are logged", again)
+        return NextStep("once more drives are logged", ("gap", folder, "--logs", "--out", out), plant)
     return after_diagnosis(verdict, folder, out, plant)
 
 

@@ -11,8 +11,8 @@ from contextlib import contextmanager
 import msgspec
 import pytest
 
-from epv_env.common.command_line import writable_file
 from epv_env.common.files import Journal, JSONFileError, decoded, read_bytes, read_json, write_bytes
+from epv_env.common.options import writable_file
 
 REMEDY = "write it anew"
 

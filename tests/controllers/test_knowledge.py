@@ -49,10 +49,11 @@ def test_shields_act_outside_the_band_only():
     full = {"on": 1.0, "head": 1.0, "p1": 9.0, "p3": 8.5}
     assert above_band(0.5)
     assert not above_band(np.nextafter(0.5, 0))
-    assert below_band(valve(**full), -0.5)
-    assert not below_band(valve(**full), -0.49)
+    low = seen(p2_error=-0.5)[0]
+    assert below_band(valve(**full), low)
+    assert not below_band(valve(**full), seen(p2_error=-0.49)[0])
     for change in ({"on": 0.0}, {"head": 0.9}, {"p3": 8.4}):  # a pulse, a low supply, one under way
-        assert not below_band(valve(**full | change), -0.5)
+        assert not below_band(valve(**full | change), low)
 
 
 class Off:
@@ -75,7 +76,7 @@ def seen(**values):
 
 def test_a_rule_overrules_the_controller_and_only_then():
     ruled = with_rules(Off(), PLANT)
-    assert ruled.name == "off, with rules"
+    assert ruled.name == "off with rules"
     ruled.reset(1)
     assert ruled.act(seen(p1=8.1, target=8.0, p2_error=0.0, p3=8.1, action=1.0))[0] == 1
     ruled.reset(1)
@@ -85,7 +86,7 @@ def test_a_rule_overrules_the_controller_and_only_then():
 def test_rules_keep_a_careless_controller_from_the_upper_edge():
     options = {"parameters": "sensitive_ten_percent", "scenario": "none"}
     bare, ruled = (
-        run_episodes(each, seeds=list(range(8)), duration=1.5, options=options)[0]
+        run_episodes(each, seeds=list(range(8)), duration=1.5, options=options)
         for each in (Off(), with_rules(Off(), PLANT))
     )
     assert bare.excursion_bar.min() > 0.5

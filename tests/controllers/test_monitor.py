@@ -8,7 +8,6 @@ import subprocess
 from dataclasses import replace
 from pathlib import Path
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -24,14 +23,13 @@ from controllers.monitor import (
     OpeningReader,
 )
 from epv_env.common.files import JSONFileError
-from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
 from identification.recordings.log_files import read_log
 from tests.training.exports import sanitisers
 from training.commands.monitor import follow, sentence
 from training.deploy.compiled import build
 from training.deploy.monitor_c import effects_of, sources
-from training.monitoring import drives
+from training.drives import drives, write_log
 
 N = len(FEATURES)
 PERIODS = 200
@@ -131,13 +129,7 @@ def test_an_opening_without_a_known_beginning_does_not_count(lengths, pause) -> 
 def test_the_log_of_a_drive_has_openings(tmp_path) -> None:
     """A log gives the coil's voltage, which is 0 while the coil is off."""
     controller = Hysteresis(open_below=-0.3, shut_above=0.0)
-    env = OperationLog(gymnasium.make("EPValve-v0", max_episode_steps=2000), tmp_path / "log")
-    observation, _ = env.reset(seed=3)
-    controller.reset(1)
-    over = False
-    while not over:
-        observation, _, _, over, _ = env.step(int(controller.act(observation[None])[0]))
-    env.close()
+    write_log(tmp_path / "log", controller, Plant.calibrated(), [3], duration=10.0)
     monitor = Monitor(white_model())
     follow(monitor, read_log(tmp_path / "log"))
     assert len(monitor.history) >= 3

@@ -7,13 +7,14 @@ from controllers import valve_learner
 from controllers.pulse import AdaptivePulse
 from controllers.pulse_table import AGE, HARDEST_FLOW, PulseTable, nominal_table
 from controllers.valve_learner import (
+    FILTER_TIME,
     GAIN_READING_ERROR,
     GAIN_SPREAD,
     MOST_RESERVE,
     OFFSET_SPREAD,
     OFFSETS,
     TOLERATED,
-    ValveLearner,
+    VALVE,
 )
 from epv_env.common.units import BAR
 from epv_env.plant.parameters import Parameters
@@ -33,19 +34,19 @@ def table():
 
 def unknown(n: int = 1):
     """Records of valves of which nothing is known."""
-    learner = ValveLearner(nominal_table(PLANT))
-    learner.reset(n)
-    return learner.valves
+    valves = np.zeros(n, VALVE)
+    for valve in valves:
+        valve_learner.begin(valve, False)
+    return valves
 
 
-def test_before_any_pulse_the_nominal_valve_is_expected(table):
-    learner = ValveLearner(table)
-    learner.reset(3)
-    np.testing.assert_allclose(learner.valves["offset"], 0.0, atol=1e-12)
-    np.testing.assert_allclose(learner.valves["gain"], 1.0)
-    np.testing.assert_allclose(learner.valves["gain_deviation"], GAIN_SPREAD)
-    np.testing.assert_allclose(learner.valves["offset_deviation"], OFFSET_SPREAD, rtol=0.02)
-    assert np.all(learner.valves["early_offset"] == pytest.approx(2.33 * OFFSET_SPREAD, abs=0.1))
+def test_before_any_pulse_the_nominal_valve_is_expected():
+    valves = unknown(3)
+    np.testing.assert_allclose(valves["offset"], 0.0, atol=1e-12)
+    np.testing.assert_allclose(valves["gain"], 1.0)
+    np.testing.assert_allclose(valves["gain_deviation"], GAIN_SPREAD)
+    np.testing.assert_allclose(valves["offset_deviation"], OFFSET_SPREAD, rtol=0.02)
+    assert np.all(valves["early_offset"] == pytest.approx(2.33 * OFFSET_SPREAD, abs=0.1))
 
 
 def ramp_table(table: PulseTable) -> PulseTable:
@@ -100,7 +101,7 @@ def controlled(parameters, *, episodes=16, periods=600, **options):
     pulse.reset(episodes)
     for _ in range(periods):
         observation = env.task.step(*env.action.decode(pulse.act(observation))).observation
-    return pulse.learner.valves, env.task
+    return pulse.memory, env.task
 
 
 def test_on_the_plant_it_finds_a_soft_spring_and_a_wide_exhaust():
@@ -121,20 +122,6 @@ def test_a_batch_is_learnt_as_its_valves_alone_to_the_bit():
     assert together[0].tobytes() == env_seed_two[0].tobytes()
 
 
-def test_a_forgotten_valve_is_unknown_again():
-    pulse = AdaptivePulse(plant=PLANT)
-    env = make_env(pulse, 2, scenario="steps", threads=1)
-    observation, _ = env.reset(seed=[0, 1])
-    pulse.reset(2)
-    for _ in range(200):
-        observation = env.task.step(*env.action.decode(pulse.act(observation))).observation
-    before = pulse.learner.valves.copy()
-    pulse.learner.forget(np.array([1]))
-    assert pulse.learner.valves[0].tobytes() == before[0].tobytes()
-    assert pulse.learner.valves[1]["offset_deviation"] > before[1]["offset_deviation"]
-    assert pulse.learner.valves[1]["deepest"] == 0.0
-
-
 def test_the_reserve_is_what_the_hardest_application_draws_beyond_what_is_tolerated(table):
     """From rest, with the hardest application as the coil is switched off, until the piston lifts."""
     p1, p2, step = 11.0 * BAR, 8.0 * BAR, 0.1e-3
@@ -153,9 +140,7 @@ def test_the_reserve_is_what_the_hardest_application_draws_beyond_what_is_tolera
     assert table.hardest_fall[0] * (table.release_lag[0] + rest) == pytest.approx(fell, rel=0.03)
 
     slow = table._replace(vent_rate=table.vent_rate / 10)
-    learner = ValveLearner(slow)
-    learner.reset(1)
-    observation = np.zeros((1, 13))
-    known = learner.observe(observation)
-    assert known["reserve"][0] == MOST_RESERVE
-    assert table.hardest_fall[0] * known["opens_from_rest"][0] > TOLERATED
+    (known,) = np.zeros(1, VALVE)
+    valve_learner.observe(known, slow, 0, np.zeros(13), 5e-3, FILTER_TIME, False)
+    assert known["reserve"] == MOST_RESERVE
+    assert table.hardest_fall[0] * known["opens_from_rest"] > TOLERATED

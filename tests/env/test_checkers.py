@@ -44,13 +44,3 @@ def test_gymnasium_s_vector_wrappers_accept_the_batch(identifier):
         assert np.all(np.isfinite(observation))
     np.testing.assert_allclose(infos["episode"]["r"], returns, rtol=1e-6)
     np.testing.assert_array_equal(infos["episode"]["l"], 10)
-
-
-def test_spaces_of_the_batch_hold_what_it_returns(identifier):
-    env = native(identifier, 4)
-    observation, infos = env.reset(seed=0)
-    assert env.observation_space.contains(observation)
-    assert infos == {}
-    observation, reward, terminated, truncated, _ = env.step(env.action_space.sample())
-    assert env.observation_space.contains(observation)
-    assert (reward.dtype, terminated.dtype, truncated.dtype) == (np.float64, bool, bool)

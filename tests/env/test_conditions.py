@@ -1,6 +1,5 @@
 """Conditions beyond the ordinary do what they say, in the single environment and the batch alike."""
 
-from dataclasses import replace
 from typing import Any
 
 import gymnasium
@@ -60,22 +59,6 @@ def test_a_probability_is_the_share_of_the_episodes():
         assert 70 <= changed <= 130, name  # four standard deviations of 200 coins
 
 
-@pytest.mark.parametrize("name", ["rest", "worn", "frozen_p3"])
-def test_what_a_condition_draws_does_not_depend_on_the_others_probabilities(name):
-    alone, _ = starts(**{name: 0.3})
-    beside, _ = starts(**{name: 0.3, "noisy": 1.0})
-    for a, b in zip(alone[:40], beside[:40], strict=True):
-        assert str(a) == str(replace(b, noise_factor=a.noise_factor, noise=a.noise))
-
-
-def test_first_states_are_physical():
-    found, plain = starts(**dict.fromkeys(("starved", "far", "vented", "coil_off"), 0.5))
-    for start, usual in zip(found, plain, strict=True):
-        assert 1.5 * BAR < start.p2 <= max(start.p1, usual.p2)
-        assert start.p3 in (start.p1, start.parameters["p_env"])
-        assert start.coil or start is not usual
-
-
 def test_a_worn_valve_has_one_to_three_effects_up_to_their_typical_size():
     nominal = Parameters.calibrated()
     mild = {size.symbol: max(map(abs, size.mild)) for sizes in WORN for size in sizes}
@@ -87,14 +70,6 @@ def test_a_worn_valve_has_one_to_three_effects_up_to_their_typical_size():
         assert all(abs(size) <= 1.0001 * mild[symbol] for symbol, size in sizes.items())
         seen |= set(sizes)
     assert seen == set(mild)
-
-
-def test_a_bias_and_a_delay_stay_in_their_ranges():
-    found, _ = starts(biased_p2=1.0, delayed=1.0)
-    bias = np.array([start.parameters["b_p2"] for start in found]) / BAR
-    delay = np.array([start.parameters["t_delay"] for start in found])
-    assert -0.256 <= bias.min() < -0.2 < 0.2 < bias.max() <= 0.256
-    assert 0 <= delay.min() < 1e-3 < 4e-3 < delay.max() <= 5e-3
 
 
 def test_a_rest_delays_the_applications_and_nothing_else():

@@ -83,13 +83,6 @@ def test_an_autoreset_forgets_the_options(mode):
     np.testing.assert_array_equal(seen[-1], usual[-1])
 
 
-def test_a_range_is_drawn_from_for_each_episode():
-    drawn = [p["alphaMV"] for p in episodes(valve(parameters={"alphaMV": (0.6, 0.7)}))]
-    assert 0.6 <= min(drawn) < 0.61
-    assert 0.69 < max(drawn) <= 0.7
-    assert len(set(drawn)) == len(drawn)
-
-
 def test_a_plant_file_is_the_centre_and_its_region_is_confidence(tmp_path):
     centre = Parameters.calibrated().replace(alphaMV=0.8)
     plant = Plant(parameters=centre, region=Region(centre=centre, boxes={"R": (40.0, 41.0)}))

@@ -45,7 +45,7 @@ def driven(env, actions):
 def test_what_follows_is_the_same_to_the_bit(kind, count, mode):
     env, rng = make(kind, count, mode), np.random.default_rng(0)
     env.reset(seed=4)
-    actions = rng.integers(0, 2, size=(600, count) if count else 600)
+    actions = rng.integers(0, 2, size=(330, count) if count else 330)
     driven(env, actions[:270])  # beyond a block of noise, and an episode ends soon
     saved = copy.deepcopy(save_state(env))
     copied = copy.deepcopy(env)

@@ -89,15 +89,6 @@ def test_a_trajectory_does_not_depend_on_threads(identifier):
     assert_same(run(native(identifier, n, threads=2), actions(identifier, n, 20)), one)
 
 
-def test_a_companion_with_the_cone_effect_changes_nothing(identifier):
-    """The kernel compiled for the effects gives a valve without them the same trajectory."""
-    commands = actions(identifier, 2, PERIODS)
-    mixed = {"parameters": ["exact", {"a2": 2e-4}]}
-    found = run(native(identifier, 2), commands, options=mixed)
-    plain = run(native(identifier, 2), commands)
-    assert_same(part(found, slice(0, 1)), part(plain, slice(0, 1)))
-
-
 def test_the_comparison_can_fail(identifier):
     """Another seed, another action or another parameter is noticed."""
     commands = actions(identifier, 3, 20)

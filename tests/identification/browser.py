@@ -36,6 +36,11 @@ def opened(path: Path, window: tuple[int, int]) -> Iterator[Any]:
         chromium.close()
 
 
+def unfold(page: Any) -> None:
+    """Open every section."""
+    page.evaluate("document.querySelectorAll('details').forEach(part => part.open = true)")
+
+
 def screenshot(page: Any, path: Path) -> None:
     """A picture of the whole page; fails for a blank one."""
     page.screenshot(path=path, full_page=True)
@@ -89,6 +94,7 @@ def check_layout(path: Path, pictures: Path) -> None:
     """What holds for every report: nothing sticks out, all can be read, links work, pages are full."""
     for name, window in {"desk": DESK, "phone": PHONE}.items():
         with opened(path, window) as page:
+            unfold(page)
             screenshot(page, pictures / f"{name}.png")
             assert width_of_content(page) <= window[0]
             assert smallest_letters(page) >= 12

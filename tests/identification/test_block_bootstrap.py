@@ -21,15 +21,6 @@ def test_blocks_hold_every_sample_once(samples):
     np.testing.assert_allclose(sums.sum(axis=0), series.sum(axis=1))
 
 
-def test_blocks_last_as_long_at_any_rate():
-    assert block_length(1200, 10.0) == 60
-    assert block_length(6000, 50.0) == 300
-
-
-def test_a_slow_plant_has_enough_blocks():
-    assert len(block_starts(1200, block_length(1200, 300.0))) == 20
-
-
 def test_weights_of_a_run_add_up_to_its_blocks():
     weights = block_weights([5, 30], 1)
     np.testing.assert_array_equal(weights[0], 1)

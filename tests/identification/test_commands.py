@@ -13,7 +13,8 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers the environments
-from epv_env.common.commands import commands, help_line, parser_of
+from epv_env.common.commands import commands, help_line
+from epv_env.common.options import parser_of
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
@@ -72,15 +73,14 @@ def test_run_finds_the_truth_and_says_so(finished):
 def test_the_report_needs_no_other_file(finished):
     page = (finished / "report.html").read_text()
     sources = re.findall(r'(?:src|href)="([^"]{0,20})', page)
-    assert len(sources) > 10
+    assert len(sources) > 3
     assert all(source.startswith(("data:image/svg+xml", "#")) for source in sources)
-    assert page.index("Contents") < page.index("<figure")
     assert len(page) < 5e6
 
 
 def test_the_report_begins_with_the_values_their_meaning_and_whether_to_trust_them(finished):
     page = (finished / "report.html").read_text()
-    first = page[page.index("<h1>") : page.index("Contents")]
+    first = page[page.index("<h1>") : page.index("<details>")]
     value = f"{load_plant(finished / 'plant.json').parameters['R']:.5g}"
     assert f'resistance of the solenoid (R)</td><td data-column="value (95 % interval)">{value}' in first
     assert first.count('<tr class="good">') == 4

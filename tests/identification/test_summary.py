@@ -9,7 +9,7 @@ import pytest
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration.calibrate import Calibration
 from identification.pipeline.identification import ESTIMATOR, Identification
-from identification.pipeline.summary import common_reasons, judge_values, summary_section
+from identification.pipeline.summary import common_reasons, judge_values, summary_section, worst
 from identification.report.page import Table
 from identification.validation import Validation, validate
 from tests.identification.confidence.results import twin_confidence
@@ -55,6 +55,7 @@ def test_a_model_that_misses_held_out_recordings_makes_all_values_doubtful():
     assert verdict.status == "doubt"
     assert "held-out I is missed by" in verdict.text
     assert set(values(made).statuses) == {"doubt"}
+    assert {row[-1] for row in values(made).rows} == {"with care: for the reason above"}
 
 
 def test_without_a_held_out_recording_nothing_is_promised():
@@ -82,7 +83,8 @@ def test_only_the_value_at_an_end_of_its_domain_is_not_to_be_used(symbol):
     z = calibration().best(ESTIMATOR).z.copy()
     place = vector.symbols.index(symbol)
     z[place] = np.max(vector.bounds[place])
-    statuses = {t.symbol: t.status for t in judge_values(identification(with_best(z=z)))}
+    judged = judge_values(identification(with_best(z=z)))
+    statuses = {symbol: worst(reasons) for symbol, reasons in judged.items()}
     assert statuses[symbol] == "bad"
     assert "bad" not in {status for other, status in statuses.items() if other != symbol}
 
@@ -94,5 +96,5 @@ def test_a_wide_interval_is_doubted():
         twin_confidence(), covariance=replace(wide, inputs=wide.inputs + 1.0)
     )
     judged = judge_values(made)
-    assert {trust.status for trust in judged} == {"doubt"}
-    assert all("wide" in trust.reasons[-1].text for trust in judged)
+    assert {worst(reasons) for reasons in judged.values()} == {"doubt"}
+    assert all("wide" in reasons[-1].text for reasons in judged.values())

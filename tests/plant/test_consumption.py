@@ -86,13 +86,6 @@ def test_draws_lie_within_the_stated_ranges_and_fill_them(name):
     assert np.all((leaks >= scenario.leak[0]) & (leaks <= scenario.leak[1]))
 
 
-@pytest.mark.parametrize("name", SCENARIOS)
-def test_no_control_period_can_meet_three_applications(name):
-    scenario = SCENARIOS[name]
-    shortest = scenario.rise[0] + scenario.hold[0] + scenario.fall[0] + scenario.pause[0]
-    assert shortest > LONGEST_PERIOD
-
-
 def test_the_drawn_sequence_wraps_with_a_pause_between():
     one = draw_profile("pumping", np.random.default_rng(3))
     found = flows([one], 20e-3, 2.2 * one.span)[:, 0]

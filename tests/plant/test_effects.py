@@ -12,7 +12,6 @@ from epv_env.plant.effects.coil import COOLING_TIME, COPPER
 from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.friction import STRIBECK_SPEED, stribeck
 from epv_env.plant.effects.law import KNOTS, placed
-from epv_env.plant.effects.magnet import saturated_force
 from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, has_effects
 from epv_env.plant.equations import (
     Coefficients,
@@ -326,9 +325,3 @@ def test_the_swept_volume_raises_the_pressure_of_a_sealed_chamber():
     gained = run.state.air_in_MV - run.state.air_vented
     np.testing.assert_allclose(held - held[0], gained, rtol=0, atol=1e-11)
     assert np.max(run.state.xPV) > 1e-3
-
-
-@pytest.mark.parametrize("u", [1e-6, 0.3, 3.0])
-def test_the_saturated_force_is_the_coenergy_s(u):
-    exact = (np.log1p(u) - u / (1 + u)) / u**2 if u > 1e-3 else 0.5 - 2 / 3 * u
-    assert saturated_force.py_func(u) == pytest.approx(exact, abs=1e-5)

@@ -88,22 +88,6 @@ def test_joint_draws_fill_their_ellipsoid_uniformly():
     assert np.max(np.abs(share - (np.arange(len(share)) + 0.5) / len(share))) < 0.03
 
 
-def test_joint_draws_of_symbols_of_any_magnitude_stay_inside_the_ellipsoid():
-    """RML is 1e7 and alphaMV is 1: their variances differ by more than a float's digits."""
-    deviations = np.array([1.5e-4, 7.5e-4, 3e5, 3e-3])
-    covariance = deviations[:, None] * CORRELATIONS * deviations
-    change = offsets(joint(covariance, CALIBRATED_SYMBOLS), 500) / deviations
-    squared = np.einsum("ni,ij,nj->n", change, np.linalg.inv(CORRELATIONS), change)
-    assert np.max(squared) <= CHI_SQUARE * (1 + 1e-6)
-
-
-def test_a_singular_covariance_draws_within_its_plane():
-    both = np.outer(DEVIATIONS[:2], DEVIATIONS[:2])
-    change = offsets(joint(both, SYMBOLS[:2]), 200) / DEVIATIONS[:2]
-    np.testing.assert_allclose(change[:, 0], change[:, 1], atol=1e-6)
-    assert np.std(change) > 0.5
-
-
 def test_joint_draws_stay_inside_the_domains():
     for p in (joint(400 * COVARIANCE).draw(np.random.default_rng(seed)) for seed in range(300)):
         for symbol in SYMBOLS:

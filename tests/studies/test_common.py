@@ -35,8 +35,3 @@ def test_a_trial_run_works_on_a_copy_of_the_page(tmp_path):
     assert (folder / "README.md").read_text() == PAGE
     assert "new" in (out / "README.md").read_text()
     assert options.work == out
-
-
-def test_results_stand_beside_the_page_unless_told_otherwise(tmp_path):
-    options = study_options(study_parser("Speed.", tmp_path), [])
-    assert options.out == tmp_path != options.work

@@ -6,13 +6,15 @@ import pytest
 from docs.studies.logs import study
 from identification.recordings.log_files import read_log
 
+pytestmark = pytest.mark.slow
+
 
 def test_a_deviating_law_changes_what_is_logged_and_none_does_not(tmp_path, monkeypatch):
-    monkeypatch.setattr(study, "PERIODS", 200)
+    monkeypatch.setattr(study, "DURATION", 1.0)
     valve = study.drawn(0) | {"seeds": [3], "effects": {"control_chamber_heat": {"tau_3": 0.01}}}
 
     def logged(name: str, **changes: float) -> np.ndarray:
-        study.write_log(valve | changes, tmp_path / name)
+        study.log_drives(valve | changes, tmp_path / name)
         return read_log(tmp_path / name).drives[0].p3
 
     none, strong = logged("none", deviation=0.0), logged("strong", deviation=0.5)
@@ -22,7 +24,6 @@ def test_a_deviating_law_changes_what_is_logged_and_none_does_not(tmp_path, monk
     assert np.max(np.abs(strong - plain)) > 5e3
 
 
-@pytest.mark.slow
 def test_the_short_form_writes_the_page(tmp_path):
     assert study.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / "README.md").read_text(encoding="utf-8")

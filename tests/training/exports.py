@@ -10,15 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from controllers.held_readings import READINGS
 from controllers.hysteresis import Hysteresis
-from controllers.policy_files import Network, write_policy
+from controllers.network import Network
+from controllers.policy_files import write_policy
 from epv_env.common.commands import main_of
 from epv_env.observation import LAYOUT
 from training.deploy.agreement import STATES_EPISODES as EPISODES
 from training.deploy.agreement import STATES_PERIODS as PERIODS
 from training.deploy.c_code import INPUTS, MEMORY
-from training.deploy.compiled import READINGS_TYPE, library, logits_of
+from training.deploy.compiled import READINGS, READINGS_TYPE, library, logits_of
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
 QUICK = ("--episodes", "4", "--duration", "1")

@@ -1,6 +1,7 @@
 """A controller's own figures: as logged, as simulated, and what a cause explains of the difference."""
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 from typing import Any
 
@@ -15,9 +16,10 @@ from epv_env.signals import RecordedConsumption
 from identification.recordings.log_files import Drive, Log
 from training import closed_loop
 from training.closed_loop import KINDS, ClosedLoop, consumption, sentence
-from training.monitoring import drives
+from training.drives import drives
 
-PLANT, POLICY, TARGET = Plant.calibrated(), load_policy(), 8.0
+PLANT, TARGET = Plant.calibrated(), 8.0
+policy = cache(load_policy)
 TIME = np.arange(2400) * 0.005
 FLOW = np.interp(TIME % 4.0, [1.0, 1.2, 2.0, 2.3], [0.1, 3.0, 3.0, 0.1])
 """Consumption of brake applications [g/s]."""
@@ -27,11 +29,17 @@ def with_effect(**sizes: float) -> Plant:
     return replace(PLANT, parameters=PLANT.parameters.replace(**sizes))
 
 
-def logged(plant: Plant) -> Log:
-    """What the shipped policy logs on a plant."""
+@pytest.fixture(autouse=True)
+def few_repeats(monkeypatch):
+    monkeypatch.setattr(closed_loop, "REPEATS", 2)
+
+
+@cache
+def logged(**sizes: float) -> Log:
+    """What the shipped policy logs on a plant with an effect."""
     scenario = RecordedConsumption.from_samples(TIME, FLOW)
     options = {"scenario": scenario, "target_bar": TARGET}
-    rows = drives(plant, POLICY, [1, 2], options, duration=12.0)
+    rows = drives(with_effect(**sizes), policy(), [1, 2], options, duration=12.0)
     target = np.full(len(TIME), TARGET * BAR)
     found = [
         Drive(
@@ -48,15 +56,14 @@ def logged(plant: Plant) -> Log:
 
 @pytest.mark.parametrize("sizes", [{}, {"tau_p2": 0.02}, {"A_PV": 5e-8}, {"F_PV": 8.0}])
 def test_consumption_is_read_off_p2(sizes):
-    plant = with_effect(**sizes)
-    found = consumption(logged(plant).drives[0], 0.005, plant.parameters) / GRAM
+    found = consumption(logged(**sizes).drives[0], 0.005, with_effect(**sizes).parameters) / GRAM
     assert np.sqrt(np.mean((found - FLOW)[100:] ** 2)) < 0.3
     assert abs(np.mean((found - FLOW)[100:])) < 0.06
 
 
 def test_a_cause_explains_what_it_did_to_the_controller():
-    lag = with_effect(tau_p2=0.03)
-    result = ClosedLoop(logged(lag), PLANT, POLICY).compared(lag)
+    lag = {"tau_p2": 0.03}
+    result = ClosedLoop(logged(**lag), PLANT, policy()).compared(with_effect(**lag))
     explained = dict(zip([kind.title for kind in KINDS], result.explained, strict=True))
     for title in ("rms of p2 - target", "highest overshoot", "switchings"):
         assert explained[title] > 0.7
@@ -66,14 +73,13 @@ def test_a_cause_explains_what_it_did_to_the_controller():
 
 
 def test_nothing_is_claimed_without_an_effect():
-    result = ClosedLoop(logged(PLANT), PLANT, POLICY).compared(with_effect(tau_p2=0.001))
+    result = ClosedLoop(logged(), PLANT, policy()).compared(with_effect(tau_p2=0.001))
     assert np.all(np.isnan(result.explained))
     assert "as far as this method can tell" in sentence(result, "recalibrated")[1]
 
 
-def test_only_drives_in_which_the_cause_acts_count(monkeypatch):
-    monkeypatch.setattr(closed_loop, "REPEATS", 2)
-    loop = ClosedLoop(logged(PLANT), PLANT, POLICY)
+def test_only_drives_in_which_the_cause_acts_count():
+    loop = ClosedLoop(logged(), PLANT, policy())
     kept = SimpleNamespace(labels=("lag",), title="lag of p2")
     found: Any = SimpleNamespace(onset=("drive-1.csv", 0.99), kept=kept)
     (section,) = loop.sections(found, with_effect(tau_p2=0.02))
@@ -84,8 +90,8 @@ def test_only_drives_in_which_the_cause_acts_count(monkeypatch):
 
 
 def test_a_controller_that_wrote_no_log_is_refused_before_the_diagnosis():
-    log = logged(PLANT)
+    log = logged()
     with pytest.raises(ValueError, match="cannot have written a log"):
         ClosedLoop(log, PLANT, tuned("PWM"))
     with pytest.raises(ValueError, match="decides each 5 ms"):
-        ClosedLoop(replace(log, period=0.01), PLANT, POLICY)
+        ClosedLoop(replace(log, period=0.01), PLANT, policy())

@@ -15,7 +15,7 @@ from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, save_plant
 from training.evaluation import batches
 from training.evaluation.batches import Batch, in_batches, run_batches
-from training.evaluation.rollout import decision_times, run_episodes
+from training.evaluation.rollout import run_episodes
 from training.evaluation.scenarios import EVALUATION, EvaluationScenario
 from training.studies.comparison import PLANTS, as_text, compare, differences, rows
 
@@ -49,8 +49,8 @@ def results():
 
 
 def test_an_episode_depends_on_its_seed_alone():
-    many, _ = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
+    many = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
+    alone = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
     assert many.episode_return[7] == alone.episode_return[0]
 
 
@@ -61,7 +61,6 @@ def test_a_restart_makes_the_controller_forget_once_at_its_time():
 
 
 def test_batches_hold_the_episodes_of_one_run(monkeypatch):
-    monkeypatch.setattr(batches, "BATCH_EPISODES", 2)
     options = {"plant": PLANT, "scenario": "steps"}
     whole = Batch(
         name="w",
@@ -71,23 +70,23 @@ def test_batches_hold_the_episodes_of_one_run(monkeypatch):
         duration=0.8,
         options=options,
     )
-    parts = in_batches(5, whole)
-    assert [part.episodes for part in parts] == [2, 2, 1]
-    found = run_batches([*parts, whole], {"good": GOOD}, what="test")
-    joined = np.concatenate([found[part.name].excursion_bar for part in parts])
-    np.testing.assert_array_equal(joined, found["w"].excursion_bar)
-    alone, _ = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
-    assert joined[2] == alone.excursion_bar[0]
+    (at_once,) = run_batches([whole], {"good": GOOD}, what="test")
+    monkeypatch.setattr(batches, "BATCH_EPISODES", 2)
+    assert [part.episodes for part in in_batches(whole)] == [2, 2, 1]
+    (in_parts,) = run_batches([whole], {"good": GOOD}, what="test")
+    np.testing.assert_array_equal(in_parts.excursion_bar, at_once.excursion_bar)
+    alone = run_episodes(GOOD, seeds=[7], duration=0.8, options=options)
+    assert in_parts.excursion_bar[2] == alone.excursion_bar[0]
 
 
 def test_what_is_in_the_journal_is_not_run_again(tmp_path):
     batch = Batch(
         name="b", controller="good", first_seed=5, episodes=2, duration=0.6, options={"plant": PLANT}
     )
-    first = run_batches([batch], {"good": GOOD}, journal=Journal(tmp_path / "j", {}), what="test")
-    again = run_batches([batch], {}, journal=Journal(tmp_path / "j", {}), what="test")
+    (first,) = run_batches([batch], {"good": GOOD}, journal=Journal(tmp_path / "j", {}), what="test")
+    (again,) = run_batches([batch], {}, journal=Journal(tmp_path / "j", {}), what="test")
     for name in ("stayed", "excursion_bar", "episode_return"):
-        np.testing.assert_array_equal(getattr(again["b"], name), getattr(first["b"], name))
+        np.testing.assert_array_equal(getattr(again, name), getattr(first, name))
 
 
 def test_the_comparison_separates_good_from_late(results):
@@ -114,18 +113,12 @@ def test_a_scenario_may_have_its_own_length():
     found = [
         compare(
             {"good": GOOD}, plant=PLANT, plant_sets=["calibrated"], episodes=2, duration=1.0,
-            scenarios={"s": EvaluationScenario(meaning="", options={"scenario": "none"}, duration=d)},
+            scenarios={"s": EvaluationScenario(options={"scenario": "none"}, duration=d)},
         )
         for d in (None, 0.6)
     ]  # fmt: skip
     long, short = (each["calibrated", "s", "good"].episode_return for each in found)
     assert np.all(long < short)
-
-
-def test_what_a_decision_computes_is_what_is_timed():
-    times = decision_times(GOOD, 40)
-    assert len(times) == 40
-    assert 0 < np.median(times) < 1e-3
 
 
 def command(*arguments):
@@ -145,8 +138,7 @@ def finished(tmp_path_factory):
 def test_the_short_form_writes_everything(finished):
     out, _ = finished
     assert {path.name for path in out.iterdir()} == {
-        "comparison.csv", "differences.csv", "results.json", "comparison.png", "episode.png",
-        "finished.jsonl",
+        "comparison.csv", "differences.csv", "results.json", "comparison.png", "finished.jsonl",
     }  # fmt: skip
     content = json.loads((out / "results.json").read_text())
     assert [row["controller"] for row in content["rows"]] == ["hysteresis", "relay"]
@@ -182,7 +174,7 @@ def test_a_plant_of_another_voltage_has_figures_of_its_own(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--controllers", "nobody"], "no controller 'nobody': give a folder that training wrote"),
+        (["--controllers", "nobody"], "no controller 'nobody': give PPO, hysteresis"),
         (["--scenarios", "flood"], "no scenario 'flood'"),
         (["--against", "nobody"], "--against 'nobody' takes no part"),
         (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),

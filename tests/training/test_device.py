@@ -4,6 +4,7 @@ import os
 import pickle
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -87,6 +88,6 @@ def test_a_batch_on_a_simulated_device_gives_the_figures_of_the_cpu(tmp_path: Pa
 
 
 def test_batches_of_a_device_are_larger_and_have_names_of_their_own():
-    parts, others = in_batches(9000, batch("cuda")), in_batches(9000, batch("cpu"))
+    parts, others = (in_batches(replace(batch(d), episodes=9000)) for d in ("cuda", "cpu"))
     assert len(parts) == 2 < len(others)
     assert not {part.name for part in parts} & {part.name for part in others}

@@ -2,7 +2,6 @@
 
 import ctypes
 import json
-import os
 import re
 import shutil
 import subprocess
@@ -14,7 +13,6 @@ import pytest
 
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import read_policy
-from epv_env.common.results_folder import only_writer
 from epv_env.observation import CENTRE, INDEX, P3_LAGS, SCALE, contract, decode
 from tests.controllers.test_monitor import white_model
 from tests.training.exports import (
@@ -29,7 +27,7 @@ from tests.training.exports import (
     replay,
     sanitisers,
 )
-from training.commands.export import FILES, check_free, write_folder
+from training.commands.export import FILES
 from training.deploy import monitor_c
 from training.deploy.agreement import follow, visit
 from training.deploy.c_code import MEMORY
@@ -310,21 +308,6 @@ def test_a_folder_of_other_things_is_left_alone(tmp_path, capsys):
     policy = random_policy(tmp_path / "policy")
     assert export(policy, policy) == 2
     assert "give --out a new or empty folder" in capsys.readouterr().err
-
-
-def test_two_exports_do_not_write_into_one_folder(fitted, tmp_path, capsys):
-    with only_writer(tmp_path / "ecu"):
-        assert export(fitted[0], tmp_path / "ecu") == 2
-    assert "another process writes into" in capsys.readouterr().err
-
-
-def test_what_is_written_replaces_no_pipe_and_leaves_no_file_of_before(tmp_path):
-    write_folder(tmp_path / "ecu", {"epv_policy.c": b"1", "report.json": b"1"})
-    write_folder(tmp_path / "ecu", {"epv_policy.c": b"2"})
-    assert [path.read_bytes() for path in (tmp_path / "ecu").iterdir()] == [b"2"]
-    os.mkfifo(tmp_path / "ecu" / "report.json")
-    with pytest.raises(OSError, match="no regular file"):
-        check_free(tmp_path / "ecu")
 
 
 def test_a_failed_export_leaves_the_earlier_one(fitted, copy, capsys):

@@ -80,17 +80,6 @@ def test_recovery_lasts_from_the_events_beginning_until_p2_is_back_above_the_sho
     assert m.longest_event_recovery_s[0] == pytest.approx(3 * PERIOD)
 
 
-def test_a_shallow_event_needs_no_recovery():
-    assert run([0.0, -0.2, -0.2], consumption=[0.0, DRAWN, DRAWN]).event_recovery_s[0] == 0.0
-
-
-def test_a_dip_late_in_a_long_draw_is_no_answer_to_its_beginning():
-    late = [0.0, *[-0.1] * 8, -0.4, -0.1]
-    m = run(late, consumption=[0.0, *[DRAWN] * 10])
-    assert m.event_recovery_s[0] == 0.0
-    assert m.event_breakdown_bar[0] == pytest.approx(0.4)
-
-
 def test_a_shortfall_long_after_an_event_is_not_its_breakdown():
     quiet = [0.0] * 12
     m = run([-0.1, *quiet, -0.4], consumption=[DRAWN, *quiet, 0.0])
@@ -99,24 +88,6 @@ def test_a_shortfall_long_after_an_event_is_not_its_breakdown():
 
 def test_a_leak_is_no_event():
     assert run([-0.1] * 4, consumption=[0.0, 0.8, 0.8, 0.8]).events[0] == 0
-
-
-def test_events_of_one_episode_do_not_touch_anothers():
-    both = Meter(2, PERIOD, 0.0)
-    for k, drawn in enumerate([0.0, DRAWN, 0.0]):
-        both.update(
-            np.zeros(2), np.zeros(2, dtype=bool),
-            {
-                "deviation_bar": np.array([-0.1 * k, -0.4]),
-                "switchings": np.zeros(2),
-                "vented_g": np.zeros(2),
-                "consumption_g_per_s": np.array([drawn, 0.0]),
-            },
-        )  # fmt: skip
-    m = both.result(np.array([3.0, 6.0]))
-    assert m.events.tolist() == [1, 0]
-    np.testing.assert_allclose(m.event_breakdown_bar, [0.2, 0.0])
-    np.testing.assert_allclose(m.coil_W, [10.0, 20.0])
 
 
 def test_the_exact_bound_needs_3688_episodes_for_a_thousandth():

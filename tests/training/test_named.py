@@ -12,6 +12,7 @@ from training.evaluation.rollout import run_episodes
 pytestmark = pytest.mark.training
 
 PLANT = Plant.calibrated()
+README = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
 RELAY = Path(docs.examples.relay.__file__).read_text()
 FAULTY = """
 class NeedsArguments:
@@ -44,9 +45,9 @@ def folder(tmp_path, monkeypatch):
 
 def test_a_module_of_the_working_folder_controls_valves(folder):
     (folder / "my_relay.py").write_text(RELAY)
-    controllers, digests = named_controllers(["my_relay:Relay", "pulse, informed"], PLANT)
-    assert list(controllers) == list(digests) == ["relay", "pulse, informed"]
-    metrics, _ = run_episodes(controllers["relay"], seeds=[0, 1], duration=1.0, options={})
+    controllers, digests = named_controllers(["my_relay:Relay", "informed pulse"], PLANT)
+    assert list(controllers) == list(digests) == ["relay", "informed pulse"]
+    metrics = run_episodes(controllers["relay"], seeds=[0, 1], duration=1.0, options={})
     assert metrics.switchings_per_s.min() > 0
 
 
@@ -62,7 +63,10 @@ def test_a_changed_module_is_another_controller(folder):
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("nobody", "no controller 'nobody': give a folder that training wrote"),
+        (
+            "nobody",
+            "no controller 'nobody': give PPO, hysteresis, extrapolating hysteresis, PWM, adaptive",
+        ),
         ("nowhere:Relay", "No module named 'nowhere': give MODULE:CLASS of a module in"),
         ("faulty:Relay", "module faulty has no class Relay"),
         ("faulty:SOMETHING", "module faulty has no class SOMETHING"),
@@ -80,6 +84,13 @@ def test_what_is_no_controller_is_refused(folder, source, message):
         (folder / f"{name}.py").write_text(text)
     with pytest.raises(ValueError, match=message):
         named_controllers([source], PLANT)
+
+
+def test_every_name_of_the_table_is_a_controller():
+    """Names have no commas, so that a list of them can be read."""
+    names = [line.split("|")[1].strip() for line in README.split("| controller |")[1].splitlines()[2:8]]
+    assert list(named_controllers(names, PLANT)[0]) == names
+    assert not any("," in name for name in names)
 
 
 def test_two_controllers_of_one_label_are_refused():

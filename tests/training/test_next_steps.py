@@ -11,7 +11,8 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 from epv_env.common.command_line import NextStep
-from epv_env.common.commands import commands, parse
+from epv_env.common.commands import commands
+from epv_env.common.options import parse
 from identification.gap.judge.verdict import AMBIGUOUS, KNOWN, NO_GAP, PARTIAL, UNKNOWN
 from identification.report.page import write_page
 from training.epv import PACKAGES
@@ -31,6 +32,7 @@ ENDED = {
     "export plant --out fmu --plant valve.json": "export",
     **{f"gap campaign --out {verdict} --plant valve.json": name for verdict, name in VERDICTS.items()},
     "import a.csv --out campaign --plant valve.json": "run",
+    "log --out log": "monitor",
     "monitor log --out monitor": "gap",
     "run campaign --out results": "gap",
     "run campaign --out results --stage quality --seed 3": "run",

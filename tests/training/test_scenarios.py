@@ -1,26 +1,23 @@
 """The evaluation's scenarios are what their names say, and can be controlled."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 
 pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
-from epv_env.plant.consumption import SCENARIOS, Profiles, Scenario, draw_profile
+from epv_env.common.units import BAR
+from epv_env.plant.consumption import Profiles, draw_profile
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import REFERENCE_PERIOD
 from epv_env.settings import make_settings
 from epv_env.signals import RecordedConsumption
-from training.evaluation.rollout import run_episodes
+from training.evaluation.rollout import begin_episodes, make_env, run_episodes
 from training.evaluation.scenarios import (
     BEYOND,
     EVALUATION,
     LEVELS,
-    NAMED,
-    RANDOM,
     REFILL_TIME,
     TUNING_REGION,
     VENTED_DROP_BAR,
@@ -48,49 +45,16 @@ def flow(name, seed=0):
     return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
 
 
-def test_there_are_a_dozen_and_a_random_one():
-    assert len(NAMED) >= 12
-    assert set(EVALUATION) == {RANDOM, *NAMED}
-    assert all(scenario.meaning for scenario in EVALUATION.values())
+def test_a_scenario_has_the_same_text_in_every_process():
+    """It belongs to the subject of a journal: with an address, a comparison would begin anew."""
+    for scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.values():
+        assert " at 0x" not in repr(scenario)
 
 
 def test_the_environment_accepts_every_scenario():
     for name, scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.items():
         options = {"control_period": REFERENCE_PERIOD, "parameters": TUNING_REGION, **scenario.options}
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name
-
-
-def test_one_emergency_is_one():
-    drawn = flow("one emergency")
-    assert np.sum(np.diff(drawn > 1.0) == 1) == 2  # it begins, it ends
-    assert 5.0 <= drawn.max() <= 5.5
-
-
-def test_the_anti_lock_is_faster_than_anything_in_training():
-    def bursts(drawn):
-        return np.sum((drawn[1:] > 1.0) & (drawn[:-1] <= 1.0))
-
-    fastest = max(bursts(flow("pumping", seed)) for seed in range(3))
-    assert min(bursts(flow("anti-lock", seed)) for seed in range(3)) > fastest
-
-
-def test_the_staircase_never_pauses():
-    drawn = flow("staircase")
-    first = np.argmax(drawn > 0)
-    assert np.all(drawn[first:] > 0.49)
-
-
-def test_without_the_compressor_the_reservoir_only_sags():
-    supply = settings("compressor off").supply
-    assert supply.delivery == 0.0
-    assert supply.volume < settings(RANDOM).supply.volume
-
-
-def test_a_scenario_of_ones_own_is_drawn_like_a_named_one():
-    own = replace(SCENARIOS["steps"], meaning="mine")
-    assert isinstance(own, Scenario)
-    ours, named = (draw_profile(each, np.random.default_rng(3)) for each in (own, "steps"))
-    np.testing.assert_array_equal(ours.applications, named.applications)
 
 
 class Shut(Hysteresis):
@@ -112,34 +76,33 @@ def test_an_open_valve_refills_within_the_settling_time():
         "parameters": TUNING_REGION, "drop_bar": (4.4, 4.4), "scenario": "none",
         "settling_time": REFILL_TIME,
     }  # fmt: skip
-    metrics, _ = run_episodes(
+    metrics = run_episodes(
         Open(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=2.0, options=options
     )
     assert np.all(metrics.breakdown_bar < 0.5)
 
 
+def highest_error(controller, duration, **options):
+    """Highest p2 of an episode, less its target [bar]."""
+    env = make_env(controller, 1, parameters=TUNING_REGION, **options)
+    observation, p2 = begin_episodes(env, controller, [0]), []
+    for _ in range(round(duration / env.unwrapped.settings.control_period)):
+        observation = env.advance(controller.act(observation)).observation
+        p2.append(env.task.valves.state.p2[0] / BAR)
+    return max(p2) - env.task.target[0]
+
+
 @pytest.mark.parametrize(("drop", "avoidable"), [(VENTED_DROP_BAR[0], True), (0.3, False)])
 def test_a_vented_valve_can_be_shut_in_time_only_from_far_below(drop, avoidable):
-    options = {
-        "parameters": TUNING_REGION, "p3_bar": (1.0, 1.0), "drop_bar": (drop, drop), "scenario": "none",
-    }  # fmt: skip
-    _, trace = run_episodes(
-        Shut(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=1.5, options=options,
-        trace_of=0,
-    )  # fmt: skip
-    assert trace is not None
-    assert (trace.p2_bar.max() < trace.target_bar + 0.5) == avoidable
+    options = {"p3_bar": (1.0, 1.0), "drop_bar": (drop, drop), "scenario": "none"}
+    shut = Shut(open_below=-0.1, shut_above=0.0)
+    assert (highest_error(shut, 1.5, **options) < 0.5) == avoidable
 
 
 def test_a_starved_circuit_reaches_its_band_once_refilled_and_not_before():
     controller = Hysteresis(open_below=0.0, shut_above=0.0)
-    options = {"parameters": TUNING_REGION, **BEYOND["starved"].options}
     for duration, reached in ((2.9, False), (4.5, True)):
-        _, trace = run_episodes(
-            controller, seeds=list(range(4)), duration=duration, options=options, trace_of=0
-        )
-        assert trace is not None
-        assert (trace.p2_bar.max() > trace.target_bar - 0.5) == reached
+        assert (highest_error(controller, duration, **BEYOND["starved"].options) > -0.5) == reached
 
 
 def test_every_effect_is_there_at_growing_sizes():

@@ -1,12 +1,14 @@
 """The studies of controllers in their short form: result files, pictures, and the page's tables."""
 
 from argparse import Namespace
+from dataclasses import replace
 
 import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3")
 
+from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE
 from docs.studies.comparison import study as comparison
@@ -14,30 +16,42 @@ from docs.studies.robustness import study as robustness
 from docs.studies.sim_to_real import study as sim_to_real
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant
-from epv_env.plant.region import Region
+from epv_env.plant.plantfile import Plant, save_plant
+from epv_env.plant.region import Alternative, Mixture, Region
+from identification.bench.session import run_programme
 
 pytestmark = [pytest.mark.training, pytest.mark.slow]
 
 
 def test_the_comparison(tmp_path, monkeypatch):
-    monkeypatch.setattr(comparison, "CONTROLLERS", ("pulse, adaptive", "hysteresis, extrapolating"))
+    monkeypatch.setattr(comparison, "CONTROLLERS", ("adaptive pulse", "extrapolating hysteresis"))
     assert comparison.main(["--quick", "--out", str(tmp_path)]) == 0
     names = {"comparison.csv", "differences.csv", "beyond.csv", "comparison.png", PAGE}
     assert names <= {path.name for path in tmp_path.iterdir()}
-    assert "| hysteresis, extrapolating |" in (tmp_path / PAGE).read_text(encoding="utf-8")
+    assert "| extrapolating hysteresis |" in (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "restart" in set(pd.read_csv(tmp_path / "beyond.csv")["scenario"])
 
 
 def test_the_sweep(tmp_path, monkeypatch):
-    monkeypatch.setattr(robustness, "CONTROLLERS", ("hysteresis, extrapolating",))
+    monkeypatch.setattr(robustness, "CONTROLLERS", ("extrapolating hysteresis",))
     assert robustness.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert "| 13 parameters ±10 % | hysteresis, extrapolating |" in text
+    assert "| 13 parameters ±10 % | extrapolating hysteresis |" in text
     assert (tmp_path / "robustness-conditions.png").exists()
 
 
-def test_the_loop(tmp_path):
+def test_the_loop(tmp_path, monkeypatch):
+    """With a diagnosis that is right, and the package's policy for each training."""
+
+    def diagnosed(campaign, out, *, without):
+        true = sim_to_real.true_valve(sim_to_real.CASES[0])
+        answer = Alternative(name="piston_friction", probability=1.0, region=true.region)
+        save_plant(replace(true, diagnosis=Mixture(alternatives=(answer,))), out / "plant.json")
+        (out / "gap.json").write_text('{"verdict": "known"}')
+
+    monkeypatch.setattr(sim_to_real, "diagnose_campaign", diagnosed)
+    monkeypatch.setattr(sim_to_real, "trained", lambda *plants, **options: load_policy())
+    monkeypatch.setattr(sim_to_real, "run_programme", lambda p, each, **_: run_programme(p, each))
     assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "| piston friction | known: piston friction 1.00 | " in text
@@ -50,7 +64,7 @@ def test_an_uneven_lag_without_unevenness_is_the_environment_s_own():
     options = Namespace(episodes=4, duration=1.0)
     valve = Parameters.calibrated().replace(**case.sizes)
     true = Plant(parameters=valve, region=Region(centre=valve))
-    policy = tuned("pulse, adaptive")
+    policy = tuned("adaptive pulse")
     alone = sim_to_real.measured(policy, case, true, options)
     even, uneven = (sim_to_real.UnevenLag(policy, share) for share in (0.0, 0.5))
     assert sim_to_real.measured(even, case, true, options) == alone

@@ -33,7 +33,7 @@ ROOT = Path(__file__).parents[2]
 SHORT = (
     "--designs", "conditions", "--factors", "sensor noise", "control period",
     "--episodes", 3, "--duration", 0.55,
-    "--controllers", "hysteresis, extrapolating",
+    "--controllers", "extrapolating hysteresis",
 )  # fmt: skip
 """A sweep of a few seconds."""
 BATCHES = 4 + 4
@@ -134,7 +134,7 @@ def test_a_plant_of_other_sensors_is_swept_anew(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--controllers", "nobody"], "no controller 'nobody': give a folder that training wrote"),
+        (["--controllers", "nobody"], "no controller 'nobody': give PPO, hysteresis"),
         (["--factors", "luck"], "no factor 'luck' in the designs"),
         (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
         (["--device", "cuda"], "needs an NVIDIA accelerator"),

@@ -22,10 +22,10 @@ def main(*arguments):
 def test_one_kind_alone_is_searched_and_the_others_are_kept(tmp_path):
     path = tmp_path / "tuned.json"
     save_tunings({"hysteresis": OTHER}, path, SEARCH)
-    kinds = ("--only", "hysteresis, extrapolating")
+    kinds = ("--only", "extrapolating hysteresis")
     assert main(*kinds, "--out", str(path)) == 0
     found = load_tunings(path)
-    assert list(found) == ["hysteresis", "hysteresis, extrapolating"]
+    assert list(found) == ["hysteresis", "extrapolating hysteresis"]
     assert found["hysteresis"] == OTHER
 
 

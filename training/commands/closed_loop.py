@@ -6,46 +6,47 @@ It writes what `epv gap LOGS --logs` writes, and takes up its finished fits. The
 more. The guide is docs/how-to/diagnose-a-gap.md.
 """
 
-import argparse
+from collections.abc import Sequence
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import Annotated
 
-from controllers.policy import TRAINED
-from epv_env.common.command_line import NextStep, add_out, add_plant, add_seed
-from epv_env.common.files import decoded
+from epv_env.common.command_line import NextStep
+from epv_env.common.options import Folder, PlantFile, Seed
 from epv_env.plant.plantfile import load_plant
-from identification.gap.report.gap_json import GAP
 from identification.recordings.log_files import read_log
-from identification.recordings.rules import RULES, rules_of
+from identification.recordings.rules import rules_of
 from training.closed_loop import ClosedLoop
-from training.evaluation.named import HELP, named_controllers
+from training.evaluation.named import HELP, SHIPPED, named_controllers
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the log, its controller, the nominal model, the catalogue, and where the results go."""
-    parser.add_argument("log", type=Path, help="folder with log.json (docs/reference/files.md)")
-    parser.add_argument(
-        "--controller", default=str(TRAINED),
-        help=f"that wrote the log: one of {HELP} (default: the package's policy)",
-    )  # fmt: skip
-    add_out(parser)
-    add_seed(parser, help="of resampling")
-    add_plant(parser, help="plant file of the nominal model; default: the report's calibration")
-    parser.add_argument(
-        "--without", action="append", default=[], metavar="CAUSE", help="leave out of the catalogue"
+@dataclass(frozen=True)
+class Options:
+    """The log, its controller, the nominal model, the catalogue, and where the results go."""
+
+    log: Annotated[Path, "folder with log.json (docs/reference/files.md)"]
+    _: KW_ONLY
+    controller: Annotated[str, f"that wrote the log: {HELP}"] = SHIPPED
+    out: Folder
+    seed: Annotated[Seed, "of resampling"] = 0
+    plant: Annotated[PlantFile, "plant file of the nominal model; default: the report's calibration"] = (
+        None
     )
+    without: Annotated[
+        Sequence[str], {"action": "append", "metavar": "CAUSE"}, "leave out of the catalogue"
+    ] = ()
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Diagnose the log, and compare its controller's figures. Raises ValueError."""
     # Imported here: with the extra `identification`, which the other commands do without.
     from identification.commands.gap import say
     from identification.valve_gap.diagnose import REPORT
     from identification.valve_gap.operation import diagnose_log
 
-    given = load_plant(options.plant)
-    named, _ = named_controllers([options.controller], given)
-    log = read_log(options.log, rules_of(given) if options.plant else RULES)
-    loop = ClosedLoop(log, given, next(iter(named.values())))
+    nominal = load_plant(options.plant)
+    (controller,) = named_controllers([options.controller], nominal)[0].values()
+    loop = ClosedLoop(read_log(options.log, rules_of(nominal)), nominal, controller)
     found = diagnose_log(
         options.log, options.out, plant=options.plant, without=options.without, seed=options.seed,
         more=loop.sections,
@@ -54,9 +55,8 @@ def run(options: argparse.Namespace) -> None:
     print(f"written: {options.out / REPORT}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """What the verdict in the folder of results asks for."""
-    from identification.valve_gap.operation import next_step as after
+    from identification.commands import gap
 
-    verdict = decoded(options.out / GAP, remedy="diagnose again")["verdict"]
-    return after(verdict, options.log, options.out, options.plant)
+    return gap.next_step(gap.Options(options.log, logs=True, out=options.out, plant=options.plant))

@@ -1,27 +1,29 @@
 """Compare controllers on the same unseen episodes, with intervals of the differences.
 
     python training/compare.py --out runs/comparison
-    python training/compare.py --controllers "pulse, adaptive" PPO=runs/ppo --out runs/mine
+    python training/compare.py --controllers "adaptive pulse" PPO=runs/ppo --out runs/mine
     python training/compare.py --scenarios beyond worn --plants sensitive_ten_percent --out runs/beyond
 
 A comparison that was stopped goes on where it stopped when it is started again.
 """
 
-import argparse
-from typing import Any
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 import pandas as pd
 
 from controllers.tuned import load_tunings
-from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal, write_json, write_text
-from epv_env.plant.plantfile import Plant, load_plant, plant_subject
-from epv_env.plant.valves import available_cores
+from epv_env.common.options import Count, Episodes, Folder, Names, Quick
+from epv_env.plant.plantfile import load_plant, plant_subject
 from epv_env.vector_entry import check_device
-from training.evaluation.named import HELP, is_own, named_controllers
-from training.evaluation.plots import episode_overlay, save_figure
-from training.evaluation.rollout import decision_times, run_episodes
+from training.evaluation.named import HELP, named_controllers
+from training.evaluation.plots import save_figure
+from training.evaluation.rollout import decision_times
 from training.evaluation.scenarios import RANDOM, scenario_group
 from training.evaluation.seeds import EVALUATION_SEED, check_first_seed
 from training.studies.comparison import (
@@ -37,29 +39,27 @@ from training.studies.comparison import (
 QUICK: dict[str, Any] = {"episodes": 8, "duration": 0.8, "decisions": 20}
 LISTED = 100
 """Episodes that leave the band are named by their seeds up to this many."""
-OVERLAID = 3
-"""Most controllers in the picture of one episode: more lines could not be told apart."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/comparison")
-    parser.add_argument(
-        "--controllers", nargs="+", metavar="NAME", default=list(load_tunings()),
-        help=f"{HELP} (default: all tuned kinds)",
-    )  # fmt: skip
-    parser.add_argument("--against", metavar="LABEL", help="whom the others are set against (the first)")
-    parser.add_argument("--plants", nargs="+", choices=list(PLANTS), default=list(PLANTS))
-    parser.add_argument(
-        "--scenarios", nargs="+", metavar="NAME", default=[RANDOM],
-        help="scenarios, or the groups named, beyond (beyond training), worn (one effect each)",
-    )  # fmt: skip
-    parser.add_argument("--episodes", type=COUNT, default=1024, help="in each scenario and plant set")
-    parser.add_argument("--decisions", type=COUNT, default=1000, help="whose time is measured")
-    add_episodes(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Episodes):
+    """Controllers, plants and scenarios, and how many episodes of each."""
+
+    out: Folder = Path("runs/comparison")
+    controllers: Annotated[Names, f"{HELP} (default: all tuned kinds)"] = tuple(load_tunings())
+    against: Annotated[
+        str | None, {"metavar": "LABEL"}, "whom the others are set against (the first)"
+    ] = None
+    plants: Annotated[Sequence[str], {"nargs": "+", "choices": PLANTS}, "sets of plants"] = PLANTS
+    scenarios: Annotated[
+        Names, "scenarios, or the groups named, beyond (beyond training), worn (one effect each)"
+    ] = (RANDOM,)
+    episodes: Annotated[Count, "in each scenario and plant set"] = 1024
+    decisions: Annotated[Count, "whose time is measured"] = 1000
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Run the episodes that --out lacks; write tables, differences and pictures.
 
     Raises ValueError for an unknown controller or scenario.
@@ -73,12 +73,12 @@ def run(options: argparse.Namespace) -> None:
         raise ValueError(f"--against {against!r} takes no part: give one of {', '.join(controllers)}")
     scenarios = {k: v for name in options.scenarios for k, v in scenario_group(name).items()}
     first_seed = EVALUATION_SEED + options.seed
-    shown = {name: repr(scenario) for name, scenario in scenarios.items()}
-    about = {**plant_subject(plant), "duration": options.duration, "scenarios": shown}
+    described = {name: repr(scenario) for name, scenario in scenarios.items()}
+    about = {**plant_subject(plant), "duration": options.duration, "scenarios": described}
     results = compare(
         controllers, plant=plant, scenarios=scenarios, episodes=options.episodes,
         duration=options.duration, plant_sets=options.plants, first_seed=first_seed,
-        workers=options.workers or available_cores(), digests=digests, device=options.device,
+        workers=options.workers, digests=digests, device=options.device,
         journal=Journal(options.out / "finished.jsonl", about),
     )  # fmt: skip
     times = {
@@ -89,22 +89,21 @@ def run(options: argparse.Namespace) -> None:
     paired = differences(results, against)
     settings = {name: getattr(options, name) for name in ("episodes", "duration", "seed", "plants")}
     write_results(options, table, paired, results, first_seed, {**settings, "controllers": digests})
-    draw(options, table, controllers, plant, first_seed)
+    shown = table[(table["plants"] == options.plants[-1]) & (table["scenario"] == next(iter(scenarios)))]
+    save_figure(figure(shown), options.out / "comparison.png")
     for _, cell in table.groupby(["plants", "scenario"], sort=False):
         print(f"{as_text(cell)}\n")
     print(f"results in {options.out}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Sweep the same controllers."""
-    words = ("--controllers", *options.controllers, "--out", beside(options.out, "sweep"))
-    return NextStep(
-        "to see which changes of the valve they bear", ("sweep", *words, *plant_option(options.plant))
-    )
+    words = ("sweep", "--controllers", *options.controllers, "--out", beside(options.out, "sweep"))
+    return NextStep("to see which changes of the valve they bear", words, options.plant)
 
 
 def write_results(
-    options: argparse.Namespace,
+    options: Options,
     table: pd.DataFrame,
     paired: pd.DataFrame,
     results: Results,
@@ -126,26 +125,3 @@ def write_results(
             "differences": paired.to_dict("records"),
         },
     )
-
-
-def draw(
-    options: argparse.Namespace,
-    table: pd.DataFrame,
-    controllers: dict[str, Any],
-    plant: Plant,
-    first_seed: int,
-) -> None:
-    """Draw comparison.png, of the last plant set's first scenario, and episode.png, one episode."""
-    name = table["scenario"].iloc[0]
-    cell: Any = table[(table["plants"] == options.plants[-1]) & (table["scenario"] == name)]
-    save_figure(figure(cell), options.out / "comparison.png")
-    traces = {}
-    own = next(filter(is_own, controllers), next(iter(controllers)))
-    for label in list(dict.fromkeys([own, *controllers]))[:OVERLAID]:
-        _, trace = run_episodes(
-            controllers[label], seeds=[first_seed], duration=options.duration,
-            options={"plant": plant, "scenario": "mixed"}, trace_of=0,
-        )  # fmt: skip
-        assert trace is not None  # since one was asked for
-        traces[label] = trace
-    episode_overlay(traces, own, options.out / "episode.png")

@@ -8,27 +8,20 @@ A policy is written only after its C code was compiled here and agreed with the 
 10,000 states. docs/reference/exported-policy.md says what each file is, docs/reference/fmu.md the FMU.
 """
 
-import argparse
 import hashlib
 import json
 import os
 import tempfile
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 from controllers.monitor import Monitor, MonitorModel
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
-from epv_env.common.command_line import (
-    COUNT,
-    JUDGED_SECONDS,
-    NextStep,
-    add_out,
-    add_plant,
-    beside,
-    plant_option,
-)
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import check_writable, write_bytes
+from epv_env.common.options import Count, Folder, JudgedSeconds, PlantFile
 from epv_env.common.results_folder import LOCK_FILE
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
@@ -44,24 +37,24 @@ FILES = {*CODE, "contract.json", "states.csv", "report.json", "epv_policy.fmu"}
 """What the export of a policy consists of."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    parser.add_argument("what", help=f"a folder that training wrote, or `{PLANT}`")
-    add_out(parser, help="folder to write")
-    parser.add_argument("--monitor", type=Path, help="monitor.json of `epv monitor`: its C code, too")
-    parser.add_argument("--fmu", action="store_true", help="an FMU of the policy, too")
-    add_plant(parser, help="plant file: exported, or nominal for a policy (default: the report's)")
-    parser.add_argument(
-        "--compiler", default=os.environ.get("CC", "cc"),
-        help="C compiler; '' for a plant's sources alone (default: cc)",
-    )  # fmt: skip
-    parser.add_argument("--episodes", type=COUNT, default=256, help="under the compiled code")
-    parser.add_argument(
-        "--duration", type=JUDGED_SECONDS, default=10.0, help="length of one of them [s]"
-    )
+@dataclass(frozen=True)
+class Options:
+    """What is exported, how, and the check of the compiled code."""
+
+    what: Annotated[str, f"a folder that training wrote, or `{PLANT}`"]
+    _: KW_ONLY
+    out: Annotated[Folder, "folder to write"]
+    monitor: Annotated[Path | None, "monitor.json of `epv monitor`: its C code, too"] = None
+    fmu: Annotated[bool, "an FMU of the policy, too"] = False
+    plant: Annotated[
+        PlantFile, "plant file: exported, or nominal for a policy (default: the report's)"
+    ] = None
+    compiler: Annotated[str, "C compiler; '' for a plant's sources alone"] = os.environ.get("CC", "cc")
+    episodes: Annotated[Count, "under the compiled code"] = 256
+    duration: JudgedSeconds = 10.0
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Write the files.
 
     Raises ExportError for another kind of policy, or code that does not decide as the policy.
@@ -97,21 +90,21 @@ def run(options: argparse.Namespace) -> None:
     print(f"{verdict.as_text(report, contract)}\nwritten to {options.out}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Export the other half of a closed loop of FMUs: the plant of a policy, the policy of a plant."""
-    plant = plant_option(options.plant)
     if options.what == PLANT:
-        words = ("export", TRAINED, "--fmu", "--out", beside(options.out, "policy"), *plant)
-        return NextStep("to export the package's policy for the same simulator", words)
-    words = ("export", PLANT, "--out", beside(options.out, "plant"), *plant)
-    return NextStep("to export the valve that it controls as an FMU", words)
+        words = ("export", TRAINED, "--fmu", "--out", beside(options.out, "policy"))
+        purpose = "to export the package's policy for the same simulator"
+        return NextStep(purpose, words, options.plant)
+    words = ("export", PLANT, "--out", beside(options.out, "plant"))
+    return NextStep("to export the valve that it controls as an FMU", words, options.plant)
 
 
 def prepared(folder: Path, plant: Plant) -> Export:
     """The controller in a folder that training wrote. plant: nominal, from which the learner starts."""
     content = read_contract(folder)
     return Export(
-        controller=load_policy(folder, plant),
+        policy=load_policy(folder, plant),
         period=content.observation.control_period_s,
         weights_sha256=hashlib.sha256((folder / WEIGHTS_FILE).read_bytes()).hexdigest(),
         provenance=content.provenance,
@@ -132,7 +125,7 @@ def verified(
     Raises:
         ExportError: the code does not compile, or does not decide as the controller.
     """
-    states = verdict.visit(export.controller)
+    states = verdict.visit(export.policy)
     inputs = verdict.inputs_along(export, states)
     files = sources(export)
     with tempfile.TemporaryDirectory() as temporary:
@@ -141,7 +134,7 @@ def verified(
             (folder / name).write_text(text, encoding="utf-8")
         code = compiled.library(compiler, folder)
         agreement = verdict.agreement(export, code, states, inputs)
-        loop = verdict.closed_loop(export.controller, code, episodes=episodes, duration=duration)
+        loop = verdict.closed_loop(export.policy, code, episodes=episodes, duration=duration)
         report = {
             "agreement": agreement,
             "closed_loop": {"episodes": episodes, "duration_s": duration, "controllers": loop},

@@ -6,58 +6,52 @@
 Without --model the plant is simulated first, with every effect of the catalogue: a minute or two.
 """
 
-import argparse
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import Annotated
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
 from controllers.monitor import FEATURES, Monitor, MonitorModel
-from epv_env.common.command_line import (
-    NextStep,
-    Number,
-    add_out,
-    add_plant,
-    add_seed,
-    beside,
-    plant_option,
-)
+from epv_env.common.command_line import NextStep, beside
+from epv_env.common.options import Folder, Number, PlantFile, Seed
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import Log, read_log
-from identification.recordings.rules import RULES, rules_of
+from identification.recordings.rules import rules_of
 from training.evaluation.plots import save_figure
 from training.monitoring import monitor_model
 
 MODEL, FIGURE = "monitor.json", "monitor.png"
 """What is written."""
-RATE = Number(float, 1e-6, 100.0)
 VALVES = Number(int, 2 * len(FEATURES), 10_000)
 """With fewer, the scatter between valves is not known in all features: false alarms."""
 LIKELY = 0.05
 """Probability from which a cause is named."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the log, the plant or its monitor, and where the results go."""
-    parser.add_argument("log", type=Path, help="folder with log.json (docs/reference/files.md)")
-    parser.add_argument("--model", type=Path, help=f"{MODEL} of an earlier call; default: made anew")
-    parser.add_argument(
-        "--false-alarms", type=RATE, default=0.01, help="per hour of operation (default: 0.01)"
-    )
-    parser.add_argument(
-        "--valves", type=VALVES, default=48, help="simulated valves of the plant (default: 48)"
-    )
-    add_out(parser, "runs/monitor")
-    add_plant(parser, help="plant file of the identified valve; default: the report's calibration")
-    add_seed(parser, help="of the simulation")
+@dataclass(frozen=True)
+class Options:
+    """The log, the plant or its monitor, and where the results go."""
+
+    log: Annotated[Path, "folder with log.json (docs/reference/files.md)"]
+    _: KW_ONLY
+    model: Annotated[Path | None, f"{MODEL} of an earlier call; default: made anew"] = None
+    false_alarms: Annotated[float, Number(float, 1e-6, 100.0), "per hour of operation"] = 0.01
+    valves: Annotated[int, VALVES, "simulated valves of the plant"] = 48
+    out: Folder = Path("runs/monitor")
+    plant: Annotated[
+        PlantFile, "plant file of the identified valve; default: the report's calibration"
+    ] = None
+    seed: Annotated[Seed, "of the simulation"] = 0
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Write the monitor and its picture, and say what it found. Raises ValueError."""
     plant = load_plant(options.plant)
-    log = read_log(options.log, rules_of(plant) if options.plant else RULES)
+    log = read_log(options.log, rules_of(plant))
     log.check_period(Monitor.period, "the monitor counts periods of")
     if options.model is None:
         model = monitor_model(plant, valves=options.valves, seed=options.seed)
@@ -71,17 +65,10 @@ def run(options: argparse.Namespace) -> None:
     print(f"written: {options.out / FIGURE}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Diagnose the log."""
-    words = (
-        "gap",
-        options.log,
-        "--logs",
-        "--out",
-        beside(options.out, "gap"),
-        *plant_option(options.plant),
-    )
-    return NextStep("to find the cause and its size", words)
+    words = ("gap", options.log, "--logs", "--out", beside(options.out, "gap"))
+    return NextStep("to find the cause and its size", words, options.plant)
 
 
 def follow(monitor: Monitor, log: Log) -> list[float]:

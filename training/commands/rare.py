@@ -1,34 +1,25 @@
 """Estimate how rarely an episode leaves target ±500 mbar, by splitting, with an interval.
 
-    epv rare --controller "pulse, adaptive" --region ten-percent --out runs/rare
+    epv rare --controller "adaptive pulse" --region ten-percent --out runs/rare
 
 Repetitions that are finished are kept in --out and not run again. Beside the probability it writes the
 probabilities of smaller excursions, and a picture of the episodes that leave: plants and applications.
 """
 
-import argparse
+from dataclasses import dataclass
 from functools import partial
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 import numpy as np
 
-from controllers.policy import TRAINED
-from epv_env.common.command_line import (
-    JUDGED_SECONDS,
-    NextStep,
-    Number,
-    add_out,
-    add_plant,
-    add_seed,
-    add_workers,
-    plant_option,
-)
+from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal, write_json, write_text
+from epv_env.common.options import Folder, JudgedSeconds, Number, PlantFile, Quick, Seed
 from epv_env.plant.plantfile import load_plant, plant_subject
-from epv_env.plant.valves import available_cores
 from epv_env.reward import BAND_BAR
 from training.evaluation.batches import run_jobs
-from training.evaluation.named import HELP, named_controllers
+from training.evaluation.named import HELP, SHIPPED, named_controllers
 from training.evaluation.plots import save_figure
 from training.evaluation.scenarios import EVALUATION, RANDOM
 from training.rare.episodes import Episodes
@@ -43,27 +34,24 @@ KEPT = 4
 """Rare episodes of a repetition that are described."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/rare")
-    parser.add_argument("--controller", default=str(TRAINED), metavar="NAME", help=f"one of: {HELP}")
-    parser.add_argument("--region", choices=list(REGIONS), default="ten-percent", help="plants")
-    parser.add_argument(
-        "--particles", type=Number(int, 2 * CHAIN, 10**6), default=512, help="episodes of a level"
-    )
-    parser.add_argument(
-        "--repetitions", type=Number(int, 2, 10**4), default=10, help="independent estimates"
-    )
-    parser.add_argument(
-        "--least", type=Number(float, 1e-12, 0.5), default=1e-8, help="probability to search down to"
-    )
-    parser.add_argument("--duration", type=JUDGED_SECONDS, default=10.0, help="of an episode [s]")
-    add_seed(parser, help="of the random numbers behind all episodes")
-    add_plant(parser)
-    add_workers(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The controller, the plants, and how long to look."""
+
+    out: Folder = Path("runs/rare")
+    controller: Annotated[str, HELP] = SHIPPED
+    region: Annotated[str, {"choices": tuple(REGIONS)}, "plants"] = "ten-percent"
+    particles: Annotated[int, Number(int, 2 * CHAIN, 10**6), "episodes of a level"] = 512
+    repetitions: Annotated[int, Number(int, 2, 10**4), "independent estimates"] = 10
+    least: Annotated[float, Number(float, 1e-12, 0.5), "probability to search down to"] = 1e-8
+    duration: JudgedSeconds = 10.0
+    seed: Annotated[Seed, "of the random numbers behind all episodes"] = 0
+    plant: PlantFile = None
+    workers: Annotated[int | None, Number(int, 1, 1024), "processes (default: all cores)"] = None
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Run the repetitions that --out lacks; write results.json, tail.csv and rare.png.
 
     Raises ValueError for an unknown controller.
@@ -84,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
         level=episodes.worst, moves=episodes.moves, particles=options.particles // CHAIN * CHAIN
     )
     journal = Journal(options.out / "finished.jsonl", {**plant_subject(plant), **settings})
-    work = {"journal": journal, "workers": options.workers or available_cores()}
+    work = {"journal": journal, "workers": options.workers}
     pilot = partial(
         problem.thresholds, BAND_BAR, options.least, np.random.default_rng([options.seed, 0])
     )
@@ -136,7 +124,7 @@ def sentence(result: dict[str, Any]) -> str:
     return f"{result['label']} leaves with a probability of {result['probability']:.2g} ({interval})."
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Compare the controller with the others."""
-    words = ("compare", "--controllers", options.controller, *plant_option(options.plant))
-    return NextStep("to compare it on ordinary episodes", words)
+    words = ("compare", "--controllers", options.controller)
+    return NextStep("to compare it on ordinary episodes", words, options.plant)

@@ -6,17 +6,18 @@ The bench is a virtual one. Its valve has an effect that is withheld from every 
 simulation and diagnosis see what a user sees. Finished steps in --out are kept.
 """
 
-import argparse
 import sys
+from dataclasses import asdict, dataclass
 from importlib.metadata import version
-from typing import Any
+from pathlib import Path
+from typing import Annotated, Any
 
 from controllers.policy_files import policy_digest
 from controllers.tuned import load_tunings
-from epv_env.common.command_line import COUNT, JUDGED_SECONDS, NextStep, add_out, add_seed, beside
-from epv_env.common.commands import parse
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.extras import DISTRIBUTION
 from epv_env.common.files import Journal, decoded, write_json, write_text
+from epv_env.common.options import Count, Folder, JudgedSeconds, Quick, Seed
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from identification.bench.programmes import SUITES
@@ -54,60 +55,61 @@ WITHHELD, CAMPAIGN, DIAGNOSIS = "withheld/plant.json", "campaign", "diagnosis"
 """The bench's valve, its recordings, and what is made of them, within the folder of results."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/sim-to-real")
-    parser.add_argument(
-        "--effect", default="pressure_sensor_lag=0.02,0", metavar="NAME=SIZE",
-        help="effect of the bench's valve, withheld from the diagnosis (docs/explanation/effects.md)",
-    )  # fmt: skip
-    add_seed(parser, help="of both trainings, sensors, diagnosis")
-    parser.add_argument("--timesteps", type=COUNT, default=1_200_000, help="steps of each training")
-    parser.add_argument("--episodes", type=COUNT, default=256, help="episodes of each deployment")
-    parser.add_argument("--duration", type=JUDGED_SECONDS, default=6.0, help="length of one of them [s]")
-    parser.add_argument(
-        "--suite", choices=SUITES, default="diagnosis", help="recordings that the bench makes"
-    )
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The bench's valve, its recordings, the trainings and the deployments."""
+
+    out: Folder = Path("runs/sim-to-real")
+    effect: Annotated[
+        str, {"metavar": "NAME=SIZE"},
+        "effect of the bench's valve, withheld from the diagnosis (docs/explanation/effects.md)",
+    ] = "pressure_sensor_lag=0.02,0"  # fmt: skip
+    seed: Annotated[Seed, "of both trainings, sensors, diagnosis"] = 0
+    timesteps: Annotated[Count, "steps of each training"] = 1_200_000
+    episodes: Annotated[Count, "episodes of each deployment"] = 256
+    duration: JudgedSeconds = 6.0
+    suite: Annotated[str, {"choices": SUITES}, "recordings that the bench makes"] = "diagnosis"
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """The four steps, those that --out lacks; write sim-to-real.json, performance.csv and the picture.
 
     Raises ValueError for a folder that was begun with other options, or an effect that cannot be used.
     """
     from identification.commands import gap  # with the extra `identification`
 
-    out, seed = options.out, ("--seed", str(options.seed))
-    settings = {name: v for name, v in vars(options).items() if name not in ("out", "quick")}
+    out = options.out
+    settings = {name: v for name, v in asdict(options).items() if name not in ("out", "quick")}
     settings["software"] = version(DISTRIBUTION)
     check_options(out, settings, "sim-to-real run")
-    _announce("1 of 4: the bench records its valve")
-    made = ("--suite", options.suite, "--effect", options.effect, *seed)
-    where = ("--out", str(out / CAMPAIGN), "--truth", str(out / WITHHELD))
-    recording = parse(bench, "bench", [*made, *where])
+    print("[1 of 4: the bench records its valve]", file=sys.stderr)
+    recording = bench.Options(
+        suite=options.suite, effect=[options.effect], seed=options.seed,
+        out=out / CAMPAIGN, truth=out / WITHHELD,
+    )  # fmt: skip
     bench.true_parameters(recording, load_plant(None))  # refuses an effect that cannot be used
     write_options(out, settings)  # before what it belongs to: a run may stop anywhere
     if not (out / WITHHELD).exists():
         bench.run(recording)
-    _announce("2 of 4: train on the nominal plant, deploy")
+    print("[2 of 4: train on the nominal plant, deploy]", file=sys.stderr)
     results = deployed(BEFORE, load_plant(None), options)
-    _announce("3 of 4: diagnose the campaign")
+    print("[3 of 4: diagnose the campaign]", file=sys.stderr)
     if not (out / DIAGNOSIS / GAP).exists():  # written last, after the corrected plant
-        gap.run(parse(gap, "gap", [str(out / CAMPAIGN), "--out", str(out / DIAGNOSIS), *seed]))
-    _announce("4 of 4: train on the corrected plant, deploy")
+        gap.run(gap.Options(out / CAMPAIGN, out=out / DIAGNOSIS, seed=options.seed))
+    print("[4 of 4: train on the corrected plant, deploy]", file=sys.stderr)
     results |= deployed(AFTER, load_plant(out / DIAGNOSIS / CORRECTED), options)
     report(results, options)
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Compare the two policies on the bench's valve."""
     policies = [f"{name}={options.out / name}" for name in (BEFORE, AFTER)]
-    valve = ("--plant", options.out / WITHHELD)
-    words = ("compare", "--controllers", *policies, *valve, "--out", beside(options.out, "comparison"))
-    return NextStep("to compare both policies on the bench's valve", words)
+    words = ("compare", "--controllers", *policies, "--out", beside(options.out, "comparison"))
+    return NextStep("to compare both policies on the bench's valve", words, options.out / WITHHELD)
 
 
-def deployed(stage: str, simulated: Plant, options: argparse.Namespace) -> Results:
+def deployed(stage: str, simulated: Plant, options: Options) -> Results:
     """Train on the simulated plant, then deploy in simulation and on the bench's valve.
 
     The classic controllers keep their tuning for the nominal plant.
@@ -117,7 +119,7 @@ def deployed(stage: str, simulated: Plant, options: argparse.Namespace) -> Resul
     classic, digests = named_controllers(list(load_tunings()), Plant.calibrated())
     controllers = {policy.name: policy, **classic}
     digests[policy.name] = policy_digest(folder)
-    scenario = EvaluationScenario(meaning="as in training", options={"scenario": SCENARIO})
+    scenario = EvaluationScenario(options={"scenario": SCENARIO})
     plants = {SIMULATED: simulated, MEASURED: load_plant(options.out / WITHHELD)}
     about = {place: plant_subject(plant) for place, plant in plants.items()}
     journal = Journal(folder / "deployments.jsonl", {**about, "duration": options.duration})
@@ -131,7 +133,7 @@ def deployed(stage: str, simulated: Plant, options: argparse.Namespace) -> Resul
     return results
 
 
-def report(results: Results, options: argparse.Namespace) -> None:
+def report(results: Results, options: Options) -> None:
     """Write the files of results, and print what they say of the valve itself."""
     out, performance, gaps = options.out, rows(results), gap_table(results)
     diagnosis = decoded(out / DIAGNOSIS / GAP, remedy=f"remove {out / DIAGNOSIS}")
@@ -154,8 +156,3 @@ def report(results: Results, options: argparse.Namespace) -> None:
     print("rms error, measured minus simulated [mbar], with its 95 % interval:")
     print(error[columns].to_string(index=False, float_format=lambda value: f"{value:+.0f}"))
     print(f"\nresults in {out}")
-
-
-def _announce(step: str) -> None:
-    """Say on stderr, like its progress, which step begins."""
-    print(f"[{step}]", file=sys.stderr)

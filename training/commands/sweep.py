@@ -6,25 +6,25 @@
 A sweep that was stopped goes on where it stopped when it is started again.
 """
 
-import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import pandas as pd
 
 from controllers.policy_files import holds_policy
-from epv_env.common.command_line import COUNT, NextStep, add_episodes, add_out, beside, plant_option
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import Journal, write_json, write_text
+from epv_env.common.options import Count, Episodes, Folder, Names, Quick
 from epv_env.plant.consumption import check_scenario
-from epv_env.plant.plantfile import Plant, load_plant, plant_subject
-from epv_env.plant.valves import available_cores
+from epv_env.plant.plantfile import load_plant, plant_subject
 from epv_env.vector_entry import check_device
-from training.evaluation.batches import Batch, in_batches, run_batches
-from training.evaluation.metrics import EpisodeMetrics
+from training.evaluation.batches import Batch, run_batches
 from training.evaluation.named import HELP, named_controllers
 from training.evaluation.plots import save_figure
 from training.evaluation.seeds import SWEEP_SEED, check_first_seed
-from training.studies.sweep_designs import DESIGNS, Point, chosen_points
+from training.studies.sweep_designs import DESIGNS, chosen_points
 from training.studies.sweep_report import (
     harmful_changes,
     point_table,
@@ -32,7 +32,7 @@ from training.studies.sweep_report import (
     share_figure,
 )
 
-DEFAULT = ("hysteresis, extrapolating", "pulse, adaptive", "PWM")
+DEFAULT = ("extrapolating hysteresis", "adaptive pulse", "PWM")
 """Controllers that are swept unless others are named: one of each kind."""
 
 QUICK: dict[str, Any] = {
@@ -48,23 +48,23 @@ FIGURES = {
 """Designs of each picture."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/sweep")
-    parser.add_argument("--controllers", nargs="+", default=list(DEFAULT), metavar="NAME", help=HELP)
-    parser.add_argument("--designs", nargs="+", choices=DESIGNS, default=list(DESIGNS))
-    parser.add_argument(
-        "--factors", nargs="+", default=[], help="change only these, one at a time (default: all)"
-    )
-    parser.add_argument(
-        "--episodes", type=COUNT, default=128, help="at each point that changes one thing"
-    )
-    parser.add_argument("--joint-episodes", type=COUNT, default=4096, help="at each region")
-    parser.add_argument("--scenario", default="mixed", help="consumption, where it is not what changes")
-    add_episodes(parser)
+@dataclass(frozen=True, kw_only=True)
+class Options(Episodes):
+    """Controllers, what changes, and how many episodes at each change."""
+
+    out: Folder = Path("runs/sweep")
+    controllers: Annotated[Names, HELP] = DEFAULT
+    designs: Annotated[Sequence[str], {"nargs": "+", "choices": DESIGNS}, "what changes"] = DESIGNS
+    factors: Annotated[
+        Sequence[str], {"nargs": "+"}, "change only these, one at a time (default: all)"
+    ] = ()
+    episodes: Annotated[Count, "at each point that changes one thing"] = 128
+    joint_episodes: Annotated[Count, "at each region"] = 4096
+    scenario: Annotated[str, "consumption, where it is not what changes"] = "mixed"
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Run the episodes that --out lacks; write tables and pictures.
 
     Raises ValueError for an unknown controller, scenario or factor.
@@ -76,49 +76,39 @@ def run(options: argparse.Namespace) -> None:
     controllers, digests = named_controllers(options.controllers, plant)
     points = chosen_points(plant, options.designs, options.factors)
     cells = [(point, label) for point in points for label in controllers]
-    batches = [_batches(point, label, digests[label], plant, options) for point, label in cells]
     about = {**plant_subject(plant), "scenario": options.scenario, "duration": options.duration}
-    found = run_batches(
-        [batch for each in batches for batch in each], controllers,
-        journal=Journal(options.out / "finished.jsonl", about),
-        workers=options.workers or available_cores(), what="sweep",
+    batches = [
+        Batch(
+            name=f"{point.design}, {point.factor}, {point.level}, {label} {digests[label]}",
+            controller=label,
+            first_seed=SWEEP_SEED + options.seed,
+            episodes=options.joint_episodes if point.design == "regions" else options.episodes,
+            duration=options.duration,
+            device=options.device,
+            options={"plant": plant, "scenario": options.scenario, **point.options},
+        )
+        for point, label in cells
+    ]
+    metrics = run_batches(
+        batches, controllers, journal=Journal(options.out / "finished.jsonl", about),
+        workers=options.workers, what="sweep",
     )  # fmt: skip
-    metrics = [EpisodeMetrics.joined([found[batch.name] for batch in each]) for each in batches]
     table = point_table(cells, metrics, SWEEP_SEED + options.seed)
     write_results(options, table, {**about, "controllers": digests})
     print(f"\nresults in {options.out}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Export the policy that was swept; train one if none was."""
     folders = [Path(source.rpartition("=")[2]) for source in options.controllers]
-    plant = plant_option(options.plant)
     if policy := next(filter(holds_policy, folders), None):
-        words = ("export", policy, "--out", beside(options.out, "c"), *plant)
-        return NextStep("to turn the policy into C", words)
-    words = ("train", "--out", beside(options.out, "policy"), *plant)
-    return NextStep("to train a policy beside these controllers", words)
+        words = ("export", policy, "--out", beside(options.out, "c"))
+        return NextStep("to turn the policy into C", words, options.plant)
+    words = ("train", "--out", beside(options.out, "policy"))
+    return NextStep("to train a policy beside these controllers", words, options.plant)
 
 
-def _batches(
-    point: Point, label: str, digest: str, plant: Plant, options: argparse.Namespace
-) -> list[Batch]:
-    """A point's episodes under one controller."""
-    return in_batches(
-        options.joint_episodes if point.design == "regions" else options.episodes,
-        Batch(
-            name=f"{point.design}, {point.factor}, {point.level}, {label} {digest}",
-            controller=label,
-            first_seed=SWEEP_SEED + options.seed,
-            episodes=0,
-            duration=options.duration,
-            device=options.device,
-            options={"plant": plant, "scenario": options.scenario, **point.options},
-        ),
-    )
-
-
-def write_results(options: argparse.Namespace, points: pd.DataFrame, settings: dict[str, Any]) -> None:
+def write_results(options: Options, points: pd.DataFrame, settings: dict[str, Any]) -> None:
     """Write points.csv, results.json and the pictures; print the tables."""
     write_text(options.out / "points.csv", points.to_csv(index=False))
     content = {"format": "epv-sweep/3", "settings": settings, "points": points.to_dict("records")}

@@ -7,37 +7,36 @@ The command writes the policy's files (policy.json, policy.safetensors), the val
 and two pictures, and ends with a verdict. A training that was stopped goes on with --resume.
 """
 
-import argparse
 import shutil
+from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
+import msgspec
 import pandas as pd
 
-from controllers.base import Controller
 from controllers.policy import load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
-from controllers.tuned import ablation, tuned_controllers
-from epv_env.common.command_line import (
-    COUNT,
-    JUDGED_SECONDS,
-    NextStep,
-    Number,
-    add_device,
-    add_out,
-    add_plant,
-    add_seed,
-    beside,
-    plant_option,
-)
+from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import write_text
+from epv_env.common.options import (
+    Count,
+    Device,
+    Folder,
+    JudgedSeconds,
+    Number,
+    PlantFile,
+    Quick,
+    Seed,
+)
 from epv_env.common.results_folder import CONFIG, check_same, read_config, write_options
 from epv_env.plant.consumption import check_scenario
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
 from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
 from epv_env.settings import as_region
+from training.evaluation.named import named_controllers
 from training.evaluation.plots import plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import as_text, compare, differences, figure, rows
@@ -48,12 +47,14 @@ QUICK: dict[str, Any] = {
 QUICK_TRAINING: dict[str, Any] = {
     "num_envs": 64, "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
-TIMESTEPS = 10_000_000
 REGION = "sensitive_ten_percent"
 """Plants that are trained on, and on which the verdict is given."""
-LEFT_OUT = "hysteresis"
-"""Not in the verdict's table, which has six rows: it is far worse than the others."""
-RIVAL = "pulse, adaptive"
+RIVALS = (
+    "extrapolating hysteresis with rules", "adaptive pulse with rules", "adaptive pulse", "PWM",
+    "extrapolating hysteresis",
+)  # fmt: skip
+"""Beside the policy in the verdict's table."""
+RIVAL = "adaptive pulse"
 """Whom the verdict sets the policy against: the best classic controller."""
 SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "device")
 """Options that a resumed training must share with its beginning."""
@@ -63,35 +64,32 @@ OWN = (
 )  # fmt: skip
 OWN_FOLDERS = ("best", "checkpoints")
 """What a training writes into its folder."""
+AGAIN = {"group": "again"}
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    add_out(parser, "runs/ppo")
-    parser.add_argument("--timesteps", type=COUNT, default=TIMESTEPS, help="environment steps of PPO")
-    parser.add_argument("--episodes", type=COUNT, default=1024, help="of the comparison")
-    parser.add_argument(
-        "--duration", type=JUDGED_SECONDS, default=10.0, help="length of one of them [s]"
-    )
-    add_seed(parser, help="of the training")
-    add_plant(parser)
-    parser.add_argument("--scenario", default="mixed", help="consumption scenario of the training")
-    parser.add_argument(
-        "--parameters", choices=(*REGIONS, DIAGNOSIS), default=REGION, help="plants to train on"
-    )
-    parser.add_argument(
-        "--switching-price", type=Number(float, 0.0, 1000.0), default=RewardWeights().switching,
-        help="reward's price of one switching of the coil: trades wear against breakdown",
-    )  # fmt: skip
-    add_device(parser, help="of rollout and update")
-    again = parser.add_mutually_exclusive_group()
-    again.add_argument("--resume", action="store_true", help="go on from the folder's checkpoint")
-    again.add_argument(
-        "--force", action="store_true", help="begin anew in a folder that holds a training already"
-    )
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The training, and the comparison at its end."""
+
+    out: Folder = Path("runs/ppo")
+    timesteps: Annotated[Count, "environment steps of PPO"] = 10_000_000
+    episodes: Annotated[Count, "of the comparison"] = 1024
+    duration: JudgedSeconds = 10.0
+    seed: Annotated[Seed, "of the training"] = 0
+    plant: PlantFile = None
+    scenario: Annotated[str, "consumption scenario of the training"] = "mixed"
+    parameters: Annotated[str, {"choices": (*REGIONS, DIAGNOSIS)}, "plants to train on"] = REGION
+    switching_price: Annotated[
+        float, Number(float, 0.0, 1000.0),
+        "reward's price of one switching of the coil: trades wear against breakdown",
+    ] = RewardWeights().switching  # fmt: skip
+    device: Annotated[Device, "of rollout and update: cuda is an NVIDIA accelerator (extra gpu)"] = "cpu"
+    resume: Annotated[bool, AGAIN, "go on from the folder's checkpoint"] = False
+    force: Annotated[bool, AGAIN, "begin anew in a folder that holds a training already"] = False
+    quick: Quick = False
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Train, write the policy down, compare it, and print the verdict.
 
     Raises ValueError for a folder that holds another training, and for options that do not fit.
@@ -120,16 +118,17 @@ def run(options: argparse.Namespace) -> None:
     print(verdict(options, plant, weights))
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Compare the policy on more plants; after a short run, train."""
-    plant = plant_option(options.plant)
     if options.quick:
-        return NextStep("to train a policy", ("train", "--out", beside(options.out, "full"), *plant))
-    words = ("--controllers", RIVAL, f"PPO={options.out}", "--out", beside(options.out, "comparison"))
-    return NextStep("to compare the policy on three sets of plants", ("compare", *words, *plant))
+        words = ("train", "--out", beside(options.out, "full"))
+        return NextStep("to train a policy", words, options.plant)
+    rivals, out = (RIVAL, f"PPO={options.out}"), beside(options.out, "comparison")
+    words = ("compare", "--controllers", *rivals, "--out", out)
+    return NextStep("to compare the policy on three sets of plants", words, options.plant)
 
 
-def begin_folder(options: argparse.Namespace, plant: Plant) -> None:
+def begin_folder(options: Options, plant: Plant) -> None:
     """Make the folder free for a new training, or check that it holds the one to go on with.
 
     Raises ValueError if the folder holds another training, or none to resume.
@@ -139,9 +138,10 @@ def begin_folder(options: argparse.Namespace, plant: Plant) -> None:
     if options.resume:
         if earlier is None:
             raise ValueError(f"nothing to resume in {folder}: leave --resume out")
-        same = {name: _plain(getattr(options, name)) for name in SAME_WHEN_RESUMED}
+        now = configuration(options, plant)
+        same = {name: now["options"][name] for name in SAME_WHEN_RESUMED}
         check_same(earlier["options"], same, f"{folder} was trained with", "resume with the same")
-        if earlier.get("plant") != configuration(options, plant)["plant"]:
+        if earlier.get("plant") != now["plant"]:
             raise ValueError(
                 f"the plant is another than {folder} was trained with: resume with the same plant file, "
                 "or choose another --out"
@@ -159,14 +159,10 @@ def begin_folder(options: argparse.Namespace, plant: Plant) -> None:
         )
 
 
-def _plain(value: Any) -> Any:
-    return str(value) if isinstance(value, Path) else value
-
-
-def configuration(options: argparse.Namespace, plant: Plant) -> dict[str, Any]:
+def configuration(options: Options, plant: Plant) -> dict[str, Any]:
     """Options, plant and versions: what is needed to repeat the training."""
     return {
-        "options": {name: _plain(value) for name, value in vars(options).items()},
+        "options": msgspec.to_builtins(options, enc_hook=str),
         "plant": plant_subject(plant)["plant"],
         "versions": {
             package: version(package)
@@ -175,18 +171,13 @@ def configuration(options: argparse.Namespace, plant: Plant) -> dict[str, Any]:
     }
 
 
-def contenders(folder: Path, plant: Plant) -> dict[str, Controller]:
-    """The policy and the classic controllers of the verdict's table, by label."""
-    classic = [*ablation(plant), *reversed(tuned_controllers(plant))]
-    every: list[Controller] = [load_policy(folder, plant), *classic]
-    return {controller.name: controller for controller in every if controller.name != LEFT_OUT}
-
-
-def verdict(options: argparse.Namespace, plant: Plant, weights: RewardWeights) -> str:
+def verdict(options: Options, plant: Plant, weights: RewardWeights) -> str:
     """Compare; write table and picture; a sentence, a table, and where the picture lies."""
+    policy = load_policy(options.out, plant)
+    controllers = {policy.name: policy, **named_controllers(RIVALS, plant)[0]}
     results = compare(
-        contenders(options.out, plant), plant=plant, plant_sets=[REGION],
-        scenarios={"random": EvaluationScenario(meaning="as in training", options={"weights": weights})},
+        controllers, plant=plant, plant_sets=[REGION],
+        scenarios={"random": EvaluationScenario(options={"weights": weights})},
         episodes=options.episodes, duration=options.duration,
     )  # fmt: skip
     table = rows(results)

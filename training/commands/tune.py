@@ -1,16 +1,16 @@
 """Search the classic controllers' settings with the same budget for each.
 
     epv tune --trials 100 --out controllers/tuned.json
-    epv tune --only "pulse, adaptive" --out controllers/tuned.json    # keeps the file's others
+    epv tune --only "adaptive pulse" --out controllers/tuned.json    # keeps the file's others
 
 The objective is the mean return on the training scenarios.
 """
 
-import argparse
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import optuna
 from optuna.trial import Trial
@@ -18,7 +18,8 @@ from optuna.trial import Trial
 from controllers.registration import Choice, Range, SearchSpace
 from controllers.registry import TUNED_KINDS, registration
 from controllers.tuned import TUNED_FILE, Tuning, load_search, load_tunings, save_tunings
-from epv_env.common.command_line import COUNT, SECONDS, NextStep, add_seed, writable_file
+from epv_env.common.command_line import NextStep
+from epv_env.common.options import Count, Seconds, Seed, writable_file
 from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes
@@ -96,7 +97,7 @@ def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
         controller = registration(kind).built(values, Plant.calibrated())
     except ValueError as contradiction:
         raise optuna.TrialPruned(str(contradiction)) from None
-    metrics, _ = run_episodes(controller, **scenarios)
+    metrics = run_episodes(controller, **scenarios)
     return float(metrics.episode_return.mean())
 
 
@@ -127,21 +128,21 @@ def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:
     return load_tunings(path)
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    parser.add_argument("--trials", type=COUNT, default=100, help="evaluations for each controller")
-    parser.add_argument("--episodes", type=COUNT, default=128, help="episodes of one evaluation")
-    parser.add_argument("--duration", type=SECONDS, default=6.0, help="length of an episode [s]")
-    add_seed(parser, help="of the search")
-    parser.add_argument(
-        "--out", dest="file", type=writable_file, required=True, help="JSON file to write"
-    )
-    parser.add_argument(
-        "--only", choices=TUNED_KINDS, nargs="+", help="kinds to search; --out keeps others"
-    )
+@dataclass(frozen=True, kw_only=True)
+class Options:
+    """The budget, and the file."""
+
+    trials: Annotated[Count, "evaluations for each controller"] = 100
+    episodes: Annotated[Count, "episodes of one evaluation"] = 128
+    duration: Annotated[Seconds, "length of an episode [s]"] = 6.0
+    seed: Annotated[Seed, "of the search"] = 0
+    file: Annotated[Path, writable_file, {"flag": "--out"}, "JSON file to write"]
+    only: Annotated[
+        Sequence[str], {"choices": TUNED_KINDS, "nargs": "+"}, "kinds to search; --out keeps others"
+    ] = ()
 
 
-def run(options: argparse.Namespace) -> None:
+def run(options: Options) -> None:
     """Search, write the file and print what was found.
 
     Raises ValueError if --only would mix tunings of different budgets in one file.
@@ -164,7 +165,7 @@ def run(options: argparse.Namespace) -> None:
         print(f"{kind}: mean return {tuning.mean_return:.1f} with {tuning.values}")
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Compare what was tuned, which all commands read from one file."""
     kinds = options.only or TUNED_KINDS
     place = "" if options.file.resolve() == TUNED_FILE else f", once {options.file} is {TUNED_FILE}"

@@ -7,24 +7,20 @@ epv watch PWM --window                      # on the screen
 
 import argparse
 import io
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
+from typing import Annotated
 
 import gymnasium
 import numpy as np
 from PIL import Image
 
 import epv_env  # noqa: F401 - registers the ids
-from controllers.base import Controller
+from controllers.base import Controller, Privileged
 from controllers.tuned import load_tunings
-from epv_env.common.command_line import (
-    SECONDS,
-    NextStep,
-    add_plant,
-    add_seed,
-    plant_option,
-    writable_file,
-)
+from epv_env.common.command_line import NextStep
 from epv_env.common.files import write_bytes
+from epv_env.common.options import PlantFile, Seconds, Seed, writable_file
 from epv_env.plant.plantfile import load_plant
 from training.evaluation.named import HELP, named_controllers
 
@@ -36,18 +32,28 @@ SLOWNESS = 4.0
 """How much slower than the valve the film runs: a pulse of 20 ms is to be seen."""
 
 
-def add_options(parser: argparse.ArgumentParser) -> None:
-    """Add the command's options."""
-    parser.add_argument("controller", nargs="?", default="pulse, adaptive", help=HELP)
-    parser.add_argument("--file", type=writable_file, default=Path("valve.gif"), help="film to write")
-    parser.add_argument("--window", action="store_true", help="show a window; no film")
-    parser.add_argument("--scenario", default="steps", help="consumption")
-    parser.add_argument("--duration", type=SECONDS, default=2.4, help="of the episode [s]")
-    add_seed(parser, default=4, help="of the episode")
-    add_plant(parser)
+def gif_file(text: str) -> Path:
+    """A path for a film, for argparse."""
+    if Path(text).suffix.lower() != ".gif":
+        raise argparse.ArgumentTypeError(f"{text}: films are animated GIFs: give a name in .gif")
+    return writable_file(text)
 
 
-def run(options: argparse.Namespace) -> None:
+@dataclass(frozen=True)
+class Options:
+    """The controller, the episode and the film."""
+
+    controller: Annotated[str, HELP] = "adaptive pulse"
+    _: KW_ONLY
+    file: Annotated[Path, gif_file, "film to write"] = Path("valve.gif")
+    window: Annotated[bool, "show a window; no film"] = False
+    scenario: Annotated[str, "consumption"] = "steps"
+    duration: Annotated[Seconds, "of the episode [s]"] = 2.4
+    seed: Annotated[Seed, "of the episode"] = 4
+    plant: PlantFile = None
+
+
+def run(options: Options) -> None:
     """Run the episode and write the film. Raises ValueError for an unknown controller or scenario."""
     plant = load_plant(options.plant)
     (controller,) = named_controllers([options.controller], plant)[0].values()
@@ -64,11 +70,11 @@ def run(options: argparse.Namespace) -> None:
     env.close()
 
 
-def next_step(options: argparse.Namespace) -> NextStep:
+def next_step(options: Options) -> NextStep:
     """Compare the controller with the others."""
     others = [kind for kind in load_tunings() if kind != options.controller]
-    words = ("compare", "--controllers", options.controller, *others, *plant_option(options.plant))
-    return NextStep("to compare this controller with the others", words)
+    words = ("compare", "--controllers", options.controller, *others)
+    return NextStep("to compare this controller with the others", words, options.plant)
 
 
 def episode(
@@ -81,6 +87,8 @@ def episode(
     frames = []
     observation, _ = env.reset(seed=seed)
     controller.reset(1)
+    if isinstance(controller, Privileged):
+        controller.watch(env.unwrapped.task)  # type: ignore[attr-defined]
     for step in range(round(duration / _period(env))):
         action = controller.act(observation[None])[0]
         observation, *_ = env.step(action)

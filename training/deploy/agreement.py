@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from controllers.held_readings import READINGS, readings_of
 from controllers.knowledge import ValveKnowledge
 from controllers.valve_learner import LEARNT
 from epv_env.observation import LAYOUT
 from training.deploy.c_code import LEAST_AGREEMENT, Export
-from training.deploy.compiled import CompiledPolicy, logits_of
+from training.deploy.compiled import READINGS, CompiledPolicy, logits_of, readings_of
 from training.deploy.translation import ExportError
 from training.evaluation.metrics import summary
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
@@ -131,7 +130,7 @@ def closed_loop(
     figures = {}
     seeds = list(range(CLOSED_LOOP_SEED, CLOSED_LOOP_SEED + episodes))
     for each in (controller, CompiledPolicy(code=code)):
-        metrics, _ = run_episodes(each, seeds=seeds, duration=duration, options=OPTIONS)
+        metrics = run_episodes(each, seeds=seeds, duration=duration, options=OPTIONS)
         found = summary(metrics)
         figures[each.name] = {name: found[name] for name in FIGURES}
     return figures

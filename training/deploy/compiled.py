@@ -11,13 +11,16 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.held_readings import READINGS, readings_of
+from controllers.sensor_check import CHANNELS
+from epv_env.observation import decode
 from training.deploy.c_code import MEMORY
 from training.deploy.translation import ExportError
 
 STRICT = ("-std=c99", "-O2", "-Wall", "-Wextra", "-Wpedantic", "-Werror")
 """What the exported code is compiled with here."""
 
+READINGS = (*CHANNELS, "coil")
+"""Readings of a control unit at the end of a period, in the order of the C structure."""
 READINGS_TYPE = np.dtype([*((name, "f4") for name in READINGS[:-1]), (READINGS[-1], "u1")], align=True)
 """The C structure, laid out as C lays it out."""
 
@@ -59,6 +62,15 @@ def library(compiler: list[str], folder: Path) -> ctypes.CDLL:
     code.epv_policy_logits.argtypes = (ctypes.c_void_p, ctypes.c_void_p)
     code.epv_policy_logits.restype = None
     return code
+
+
+def readings_of(observations: NDArray) -> dict[str, NDArray]:
+    """The readings behind observations (n, entries), float32 (n,) in bar, A and 0 or 1, by READINGS."""
+    wide = observations.astype(np.float64)
+    entries = ("p1", "p2_error", "p3", "I", "target", "action")
+    read = dict(zip(READINGS, (decode(wide, name) for name in entries), strict=True))
+    read |= {"p2": read["p2"] + read["target"], "coil": np.rint(read["coil"])}
+    return {name: values.astype(np.float32) for name, values in read.items()}
 
 
 @dataclass(kw_only=True)

@@ -1,8 +1,8 @@
-"""C of a controller's compiled functions: valve learner, advice and rules, from their source.
+"""C of a controller's compiled functions: check of the sensors, valve learner, advice and rules.
 
-The functions of controllers/valve_learner.py, pulse.py and knowledge.py work on one valve. In C they are
-in single precision: all numbers are `real`, indices are whole numbers in it. A valve's record is a
-structure; the table of the plant and the settings of the pulses are constants.
+The functions of controllers/sensor_check.py, valve_learner.py, pulse.py and knowledge.py work on one
+valve. In C they are in single precision: all numbers are `real`, indices are whole numbers in it. A
+record is a structure; the table of the plant and the settings of the pulses are constants.
 """
 
 import ast
@@ -28,8 +28,8 @@ static real squared(real a) { return a * a; }
 MOST = 1e38
 """Largest constant in single precision: what is larger stands for no limit."""
 
-REAL, VALVE, PLANT, ARRAY = "real", "valve", "plant", "array"
-"""Kinds of arguments: a number, a valve's record, what is constant in C, and an array with its
+REAL, VALVE, SENSES, PLANT, ARRAY = "real", "epv_valve", "epv_senses", "plant", "array"
+"""Kinds of arguments: a number, the two records of a valve, what is constant in C, and an array with its
 length."""
 
 
@@ -55,8 +55,8 @@ class ControllerC(Translation):
     """Of arrays that are passed as arguments, by their number of indices beyond one."""
     indices: tuple[str, ...]
     """Names of arguments that are always 0 in C: the plant's place in the table."""
-    record: np.dtype
-    """Of a valve."""
+    records: Mapping[str, np.dtype]
+    """By the name of the structure."""
     arrays: dict[str, NDArray] = field(default_factory=dict)
     """Constant arrays that the functions read, by name in C."""
 
@@ -64,13 +64,13 @@ class ControllerC(Translation):
         """The text of a function, and how to call it."""
         return _Body(self, python, types).translated()
 
-    def valve(self) -> str:
-        """The structure of a valve's record."""
+    def structure(self, name: str) -> str:
+        """The structure of a record."""
         fields = "".join(
-            f"    float {name}{f'[{kind.shape[0]}]' if kind.shape else ''};\n"
-            for name, (kind, *_) in (self.record.fields or {}).items()
+            f"    float {field}{f'[{kind.shape[0]}]' if kind.shape else ''};\n"
+            for field, (kind, *_) in (self.records[name].fields or {}).items()
         )
-        return f"typedef struct {{\n{fields}}} epv_valve;\n"
+        return f"typedef struct {{\n{fields}}} {name};\n"
 
     def sources(self) -> str:
         """The helpers, constant arrays, structures and functions."""
@@ -97,7 +97,9 @@ class _Body(Body):
         kind = self.given[name]
         if kind == ARRAY:
             return [f"{'' if self.writes(name) else 'const '}real *{name}", f"int {name}_n"]
-        return {VALVE: [f"epv_valve *{name}"], PLANT: []}.get(kind, [f"{kind} {name}"])
+        if kind in self.c.records:
+            return [f"{kind} *{name}"]
+        return [] if kind == PLANT else [f"{kind} {name}"]
 
     def writes(self, name: str) -> bool:
         """Whether the function writes into an array."""
@@ -149,7 +151,7 @@ class _Body(Body):
 
     def member(self, node: ast.Attribute, holder: str, attr: str) -> Typed:
         """C of an entry of a valve's record, or of a constant."""
-        if self.given.get(holder) == VALVE:
+        if self.given.get(holder) in self.c.records:
             return f"{holder}->{attr}", REAL
         return super().member(node, holder, attr)
 
@@ -159,7 +161,10 @@ class _Body(Body):
         places = [p for p in places if ast.unparse(p) not in self.c.indices]
         if isinstance(holder, ast.Name) and self.given.get(holder.id) == ARRAY:
             base, shape = holder.id, self.c.shapes.get(len(places), ())
-        elif isinstance(holder, ast.Attribute) and self.given.get(ast.unparse(holder.value)) == VALVE:
+        elif (
+            isinstance(holder, ast.Attribute)
+            and self.given.get(ast.unparse(holder.value)) in self.c.records
+        ):
             base, shape = self.value(holder)[0], ()
         else:
             values = np.asarray(self.meant(holder), dtype=np.float64)

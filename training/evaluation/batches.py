@@ -18,6 +18,7 @@ from tqdm import tqdm
 from controllers.base import Controller
 from epv_env.common.files import Journal
 from epv_env.common.results_folder import progress
+from epv_env.plant.valves import available_cores
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 
@@ -50,14 +51,14 @@ class Batch:
     """Of the plants: "cpu", or "cuda" for an accelerator, whose noise is another."""
 
 
-def in_batches(episodes: int, whole: Batch) -> list[Batch]:
-    """Batches of at most BATCH_EPISODES that together have so many episodes, from `whole`'s first on."""
+def in_batches(whole: Batch) -> list[Batch]:
+    """A batch in parts of at most BATCH_EPISODES, which have names of their own."""
     most, where = BATCH_EPISODES, ""
     if whole.device != "cpu":
         most, where = DEVICE_EPISODES, f", {whole.device}"
     parts = []
-    for begin in range(0, episodes, most):
-        count = min(most, episodes - begin)
+    for begin in range(0, whole.episodes, most):
+        count = min(most, whole.episodes - begin)
         first = whole.first_seed + begin
         name = f"{whole.name}{where}, seeds {first} to {first + count - 1}"
         parts.append(replace(whole, name=name, first_seed=first, episodes=count))
@@ -69,51 +70,52 @@ def run_batches(
     controllers: Mapping[str, Controller],
     *,
     journal: Journal | None = None,
-    workers: int = 1,
+    workers: int | None = 1,
     what: str,
-) -> dict[str, EpisodeMetrics]:
-    """Figures of each batch by name, in the order of the batches; those in the journal are not run
-    again.
+) -> list[EpisodeMetrics]:
+    """Figures of each batch, which is run in parts; parts in the journal are not run again.
 
     Args:
         batches: with names of their own.
         controllers: by label.
-        journal: batches that are finished; new ones are added.
-        workers: processes.
+        journal: parts that are finished; new ones are added.
+        workers: processes; None: one for each core.
         what: name of the progress bar.
     """
-    found: dict[str, Any] = {}
-    missing = [each for each in batches if journal is None or each.name not in journal]
-    longest_first = sorted(missing, key=lambda batch: -batch.episodes * batch.duration)
+    parts = [in_batches(whole) for whole in batches]
+    finished: dict[str, Any] = {}
+    missing = [p for each in parts for p in each if journal is None or p.name not in journal]
+    longest_first = sorted(missing, key=lambda part: -part.episodes * part.duration)
     # Processes, not threads: most of an episode is NumPy on short arrays, which holds Python's lock.
-    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
-    jobs = (delayed(_run)(batch, controllers[batch.controller]) for batch in longest_first)
+    pool: Any = Parallel(n_jobs=workers or available_cores(), return_as="generator_unordered")
+    jobs = (delayed(_run)(part, controllers[part.controller]) for part in longest_first)
     with tqdm(
-        total=sum(batch.episodes for batch in missing), desc=what, unit="episode", file=sys.stderr,
+        total=sum(part.episodes for part in missing), desc=what, unit="episode", file=sys.stderr,
         mininterval=0.2 if sys.stderr.isatty() else 10.0,
     ) as bar:  # fmt: skip
         for name, figures in pool(jobs):
-            found[name] = figures
+            finished[name] = figures
             if journal is not None:
                 journal.add(name, figures)
             bar.update(len(figures["stayed"]))
-    return {
-        batch.name: _metrics(found[batch.name])
-        if journal is None or batch.name in found
-        else journal.read(batch.name, _metrics)
-        for batch in batches
-    }
+
+    def metrics(part: Batch) -> EpisodeMetrics:
+        if journal is None or part.name in finished:
+            return _metrics(finished[part.name])
+        return journal.read(part.name, _metrics)
+
+    return [EpisodeMetrics.joined([metrics(part) for part in each]) for each in parts]
 
 
 def run_jobs(
-    jobs: Mapping[str, Callable[[], Any]], *, journal: Journal, workers: int, what: str
+    jobs: Mapping[str, Callable[[], Any]], *, journal: Journal, workers: int | None, what: str
 ) -> list[Any]:
     """Results of jobs by name, JSON-ready, in their order; those in the journal are not run again.
 
     what: name of the progress bar.
     """
     missing = {name: job for name, job in jobs.items() if name not in journal}
-    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
+    pool: Any = Parallel(n_jobs=workers or available_cores(), return_as="generator_unordered")
     done = pool(delayed(_named)(name, job) for name, job in missing.items())
     for name, result in progress(done, what=what, total=len(missing)):
         journal.add(name, result)
@@ -135,7 +137,7 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     if batch.device != "cpu":  # each episode begins with its own seed
         device = {"device": batch.device, "to_host": True, "starts": batch.episodes}
     with threadpool_limits(1):  # the figures must not depend on the threads of the linear algebra
-        metrics, _ = run_episodes(
+        metrics = run_episodes(
             replace(own, **known) if known else own,
             seeds=seeds,
             duration=batch.duration,

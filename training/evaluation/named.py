@@ -12,25 +12,26 @@ from typing import Any
 
 from controllers.base import Controller
 from controllers.knowledge import WITH_RULES
-from controllers.policy import load_policy
+from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import policy_digest
-from controllers.registry import REGISTRY
+from controllers.registry import REGISTRY, TUNED_KINDS
 from controllers.tuned import build, load_tunings
 from epv_env import MAX_EPISODE_STEPS
 from epv_env.common.field_types import shown
 from epv_env.common.files import digest
 from epv_env.plant.plantfile import Plant
 
-HELP = (
-    "kinds of controllers/tuned.json, folders of policies, LABEL=FOLDER, or MODULE:CLASS of your own, "
-    "in the working folder or installed"
-)
-"""Of the options that take controllers."""
-
-PROTOCOL = ("name", "environment", "reset", "act")
-"""What a controller has."""
+SHIPPED = "PPO"
+"""The policy that comes with the package."""
 UNTUNED = tuple(entry.kind for entry in REGISTRY if entry.search_space is None)
 """Kinds that have nothing to tune, because they see what no control unit measures."""
+HELP = (
+    f"{', '.join((SHIPPED, *TUNED_KINDS, *UNTUNED))}, a folder that training wrote, LABEL=FOLDER, or "
+    "MODULE:CLASS of your own"
+)
+"""What names a controller, for the help of options and for messages."""
+PROTOCOL = ("name", "environment", "reset", "act")
+"""What a controller has."""
 
 
 def named_controllers(
@@ -39,8 +40,7 @@ def named_controllers(
     """Controllers by label, and a digest of what each was made from.
 
     Args:
-        sources: kinds of controllers/tuned.json or UNTUNED, folders that training wrote, LABEL=FOLDER,
-            or MODULE:CLASS.
+        sources: as HELP says; a tuned kind may be followed by WITH_RULES.
         plant: that the classic ones are designed for.
 
     Raises:
@@ -59,29 +59,18 @@ def named_controllers(
 
 def _named(source: str, plant: Plant) -> tuple[str, Controller, str]:
     """Label, controller, and a digest of what defines it."""
-    tunings = load_tunings()
-    if source.removesuffix(WITH_RULES) in tunings:
-        values = tunings[source.removesuffix(WITH_RULES)].values
-        content = json.dumps(values, sort_keys=True).encode()
-        return source, build(source, values, plant), digest(content)
-    if source in UNTUNED:
-        return source, build(source, {}, plant), digest(source.encode())
+    tunings, kind = load_tunings(), source.removesuffix(WITH_RULES)
+    if kind in tunings or source in UNTUNED:
+        values = tunings[kind].values if kind in tunings else {}
+        return source, build(source, values, plant), digest(json.dumps(values, sort_keys=True).encode())
     if is_import(source):
         return _imported(source)
     label, _, folder = source.rpartition("=")
-    path = Path(folder)
+    path = TRAINED if source == SHIPPED else Path(folder)
     if not folder or not path.is_dir():
-        raise ValueError(
-            f"no controller {source!r}: give a folder that training wrote, MODULE:CLASS, or one of "
-            f"{', '.join(tunings)}"
-        )
+        raise ValueError(f"no controller {source!r}: give {HELP}")
     policy = load_policy(path, plant)
     return label or policy.name, policy, policy_digest(path)
-
-
-def is_own(label: str) -> bool:
-    """Whether a controller is the user's: a policy or a class, and no kind of this package."""
-    return label.removesuffix(WITH_RULES) not in {entry.kind for entry in REGISTRY}
 
 
 def is_import(source: str) -> bool:

@@ -2,8 +2,7 @@
 
 import gc
 import time
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import gymnasium
@@ -12,7 +11,6 @@ from numpy.typing import NDArray
 
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller, Privileged
-from epv_env.common.units import BAR
 from epv_env.result import step_info
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import EpisodeMetrics, Meter
@@ -20,24 +18,6 @@ from training.evaluation.seeds import TIMING_SEED
 
 WARM_UP_DECISIONS = 50
 """Decisions whose time is not counted."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trace:
-    """One episode over time, for figures; arrays (periods,)."""
-
-    time: NDArray
-    """End of each period [s]."""
-    p2_bar: NDArray
-    """Circuit pressure [bar absolute]."""
-    p3_bar: NDArray
-    """Control pressure [bar absolute]."""
-    target_bar: float
-    """Target of p2 [bar absolute]."""
-    coil: NDArray
-    """Share of the period with the coil on [1]."""
-    consumption_g_per_s: NDArray
-    """Mean consumption of the period [g/s]."""
 
 
 def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv | EPValvePWMVectorEnv:
@@ -55,7 +35,8 @@ def make_env(controller: Controller, n: int, **options: Any) -> EPValveVectorEnv
 def begin_episodes(
     env: EPValveVectorEnv | EPValvePWMVectorEnv,
     controller: Controller,
-    seeds: list[int],
+    seeds: Sequence[int],
+    options: dict[str, Any] | None = None,
 ) -> NDArray:
     """Start an episode for each seed under the controller; returns the first observations (n, entries).
 
@@ -65,8 +46,9 @@ def begin_episodes(
         env: of n valves.
         controller: is reset.
         seeds: n of them.
+        options: of the reset.
     """
-    observation, _ = env.reset(seed=list(seeds))
+    observation, _ = env.reset(seed=list(seeds), options=options)
     controller.reset(len(seeds))
     if isinstance(controller, Privileged):
         own: Any = env.unwrapped
@@ -81,10 +63,9 @@ def run_episodes(
     duration: float,
     options: dict[str, Any],
     restart_s: float | None = None,
-    trace_of: int | None = None,
     progress: Callable[[float], None] = lambda share: None,
-) -> tuple[EpisodeMetrics, Trace | None]:
-    """Run one episode per seed; returns their metrics and the recorded episode.
+) -> EpisodeMetrics:
+    """Run one episode per seed; returns their metrics.
 
     An episode whose circuit empties violates the constraint (C1) and ends there: the failure is charged
     once and nothing later counts. Its valve runs on unseen, since the batch runs as one.
@@ -96,7 +77,6 @@ def run_episodes(
         options: of the environment.
         restart_s: when the control unit restarts, so that the controller forgets everything, and the
             plant goes on [s]; a privileged controller remembers. None: never.
-        trace_of: index of an episode to record; None: none.
         progress: called with the share done [1].
     """
     env = make_env(controller, len(seeds), **options)
@@ -108,7 +88,6 @@ def run_episodes(
     steps = round(duration / period)
     meter = Meter(len(seeds), period, own.settings.settling_time)
     restart = None if restart_s is None else round(restart_s / period)
-    rows = []
     for step in range(steps):
         if step == restart and not isinstance(controller, Privileged):
             controller.reset(len(seeds))
@@ -117,29 +96,10 @@ def run_episodes(
         observation = result.observation
         np.copyto(energy, env.coil_energy, where=meter.running)
         meter.update(result.reward, result.failed, step_info(result))
-        if trace_of is not None:
-            state = env.task.valves.state
-            coil = env.action.decode(action)[1][trace_of]
-            rows.append(
-                (
-                    state.p2[trace_of] / BAR,
-                    state.p3[trace_of] / BAR,
-                    coil,
-                    result.consumption[trace_of] * 1e3,
-                )
-            )
         if step % 50 == 0:
             progress(step / steps)
     progress(1.0)
-    metrics = meter.result(energy - energy_before)
-    if trace_of is None:
-        return metrics, None
-    columns = np.array(rows).T
-    trace = Trace(
-        time=np.arange(1, steps + 1) * period, p2_bar=columns[0], p3_bar=columns[1],
-        target_bar=float(env.task.target[trace_of]), coil=columns[2], consumption_g_per_s=columns[3],
-    )  # fmt: skip
-    return metrics, trace
+    return meter.result(energy - energy_before)
 
 
 def decision_times(

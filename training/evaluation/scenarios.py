@@ -31,7 +31,6 @@ RANDOM = "random"
 class EvaluationScenario:
     """A named situation; every episode of it is another draw."""
 
-    meaning: str
     options: dict[str, Any] = field(default_factory=dict)
     """Of the environment: consumption, target, supply, first pressure; defaults elsewhere."""
     duration: float | None = None
@@ -47,81 +46,51 @@ def consumption(like: str | None = None, **ranges: Any) -> Scenario:
     return replace(SCENARIOS[like], **ranges)
 
 
-def _situation(meaning: str, **options: Any) -> EvaluationScenario:
+def _situation(**options: Any) -> EvaluationScenario:
     """A scenario with these options of the environment."""
-    return EvaluationScenario(meaning=meaning, options=options)
+    return EvaluationScenario(options=options)
 
-
-_NO_COMPRESSOR = replace(Supply.reservoirs((9.5, 10.5), volume_litres=40.0), delivery=0.0)
 
 NAMED: dict[str, EvaluationScenario] = {
-    "rest": _situation("nothing is drawn: reach the target, then keep still", scenario="none"),
-    "leak": _situation("a steady leak of 0.1 to 0.8 g/s", scenario="leak"),
-    "steady draw": _situation("1 to 4 g/s all the time", scenario=consumption(leak=(1.0, 4.0))),
-    "service": _situation(
-        "service braking: ramps to 1 to 3.5 g/s every few seconds", scenario="service"
-    ),
-    "steps": _situation("sudden applications of 1.5 to 5 g/s", scenario="steps"),
+    "rest": _situation(scenario="none"),
+    "leak": _situation(scenario="leak"),
+    "steady draw": _situation(scenario=consumption(leak=(1.0, 4.0))),
+    "service": _situation(scenario="service"),
+    "steps": _situation(scenario="steps"),
     "one emergency": _situation(
-        "a single application of 5 to 5.5 g/s for 2 to 3 s, after seconds of rest",
         scenario=consumption(
             "emergency", flow=(5.0, 5.5), hold=(2.0, 3.0), first=(2.0, 4.0), pause=(60.0, 60.0)
-        ),
+        )
     ),
-    "emergencies": _situation("hard applications of 1 to 2 s, again and again", scenario="emergency"),
-    "pumping": _situation("bursts of 2.5 to 5 g/s, three to eight a second", scenario="pumping"),
-    "anti-lock": _situation(
-        "faster modulation than any in training: six to twelve bursts of 3 to 5.5 g/s a second",
-        scenario=consumption("pumping", flow=(3.0, 5.5), hold=(0.04, 0.08), pause=(0.04, 0.08)),
+    "emergencies": _situation(scenario="emergency"),
+    "pumping": _situation(scenario="pumping"),
+    "anti-lock": _situation(  # faster than in any training: six to twelve bursts a second
+        scenario=consumption("pumping", flow=(3.0, 5.5), hold=(0.04, 0.08), pause=(0.04, 0.08))
     ),
-    "creeping": _situation("consumption that grows and fades over seconds", scenario="creeping"),
-    "staircase": _situation(
-        "levels of 0.5 to 5 g/s that follow one another without a pause",
-        scenario=consumption(flow=(0.5, 5.0), hold=(0.3, 0.8), pause=(0.0, 0.0)),
+    "creeping": _situation(scenario="creeping"),
+    "staircase": _situation(scenario=consumption(flow=(0.5, 5.0), hold=(0.3, 0.8), pause=(0.0, 0.0))),
+    "parking": _situation(  # the valve has to wake up
+        scenario=consumption(flow=(2.0, 4.0), hold=(0.1, 0.3), pause=(2.5, 3.5), first=(2.5, 3.5))
     ),
-    "parking": _situation(
-        "seconds of rest, then a short application: the valve has to wake up",
-        scenario=consumption(flow=(2.0, 4.0), hold=(0.1, 0.3), pause=(2.5, 3.5), first=(2.5, 3.5)),
-    ),
-    "worst repeated": _situation(
-        "the largest step, 5.5 g/s, again and again at the pace of the valve's own overshoot",
-        scenario=consumption(flow=(5.5, 5.5), hold=(0.2, 0.4), pause=(0.2, 0.4)),
+    "worst repeated": _situation(  # the largest step, at the pace of the valve's own overshoot
+        scenario=consumption(flow=(5.5, 5.5), hold=(0.2, 0.4), pause=(0.2, 0.4))
     ),
     "compressor off": _situation(
-        "40 litres at 9.5 to 10.5 bar that nothing refills, emergencies",
         scenario="emergency",
-        supply=_NO_COMPRESSOR,
+        supply=replace(Supply.reservoirs((9.5, 10.5), volume_litres=40.0), delivery=0.0),
         target_bar=(6.0, 7.5),
     ),
-    "low supply": _situation(
-        "8.5 to 9.5 bar of supply, little above the target of 7 to 8 bar",
-        scenario=MIXED,
-        supply=Supply.constant(8.5, 9.5),
-        target_bar=(7.0, 8.0),
+    "low supply": _situation(scenario=MIXED, supply=Supply.constant(8.5, 9.5), target_bar=(7.0, 8.0)),
+    "high target": _situation(scenario=MIXED, target_bar=(9.5, 10.2)),
+    "low target": _situation(  # the open valve passes most
+        scenario=MIXED, supply=Supply.constant(12.5), target_bar=(4.5, 6.0)
     ),
-    "high target": _situation(
-        "target of 9.5 to 10.2 bar, close to the supply", scenario=MIXED, target_bar=(9.5, 10.2)
-    ),
-    "low target": _situation(
-        "target of 4.5 to 6 bar from 12.5 bar of supply: the open valve passes most",
-        scenario=MIXED,
-        supply=Supply.constant(12.5),
-        target_bar=(4.5, 6.0),
-    ),
-    "low battery": _situation(
-        "the coil gets 21 V instead of 24 V: it pulls in late", scenario=MIXED, supply_voltage=21.0
-    ),
+    "low battery": _situation(scenario=MIXED, supply_voltage=21.0),  # the coil pulls in late
 }
 """Situations by name."""
 
-EVALUATION: dict[str, EvaluationScenario] = {
-    RANDOM: _situation(
-        "one of the environment's consumptions, target 6 to 9.5 bar, reservoirs: as in training",
-        scenario=MIXED,
-    ),
-    **NAMED,
-}
-"""The ordinary scenarios: random ones, and the named situations."""
+EVALUATION: dict[str, EvaluationScenario] = {RANDOM: _situation(scenario=MIXED), **NAMED}
+"""The ordinary scenarios: random ones as in training, and the named situations."""
 
 REFILL_TIME = 1.5
 """An open valve refills the circuit from 4.4 bar below the target within 1 s; with a margin [s]."""
@@ -137,35 +106,27 @@ def _late_emergency(at: float) -> Any:
 
 
 def _recovery(low: float, high: float, **options: Any) -> EvaluationScenario:
-    """An episode that begins this far below the target [bar]; options: further ones."""
-    return EvaluationScenario(
-        meaning=f"begins {low:g} to {high:g} bar below the target, an emergency after the refill",
-        options={
-            "drop_bar": (low, high), "settling_time": REFILL_TIME,
-            "scenario": _late_emergency(REFILL_TIME + 1.0), **options,
-        },
+    """An episode that begins this far below the target [bar], with an emergency after the refill.
+
+    options: further ones.
+    """
+    return _situation(
+        drop_bar=(low, high), settling_time=REFILL_TIME,
+        scenario=_late_emergency(REFILL_TIME + 1.0), **options,
     )  # fmt: skip
 
 
 def _rest(seconds: float) -> EvaluationScenario:
     """An emergency after a rest [s]."""
-    return EvaluationScenario(
-        meaning=f"nothing is drawn for {seconds:g} s, then an emergency",
-        options={"scenario": _late_emergency(seconds)},
-        duration=seconds + 4.0,
-    )
+    return EvaluationScenario(options={"scenario": _late_emergency(seconds)}, duration=seconds + 4.0)
 
 
 BEYOND: dict[str, EvaluationScenario] = {
-    "as in training": EvaluationScenario(meaning="nothing differs: plants within ±10 %"),
+    "as in training": _situation(),
     "2 to 4 bar below": _recovery(2.0, 4.0),
     "4 to 4.4 bar below": _recovery(4.0, 4.4),
-    "vented": replace(
-        _recovery(*VENTED_DROP_BAR, p3_bar=(1.0, 1.0)),
-        meaning="the control chamber begins vented, so the valve is open, 3 to 4 bar below the target",
-    ),
+    "vented": _recovery(*VENTED_DROP_BAR, p3_bar=(1.0, 1.0)),
     "target steps": _situation(
-        "target 6.5 bar, raised by 0.25 bar at 2, 4, 6 and 8 s",
         target_bar=MovingTarget.recorded(
             [0, 2, 2.001, 4, 4.001, 6, 6.001, 8, 8.001],
             [6.5, 6.5, 6.75, 6.75, 7.0, 7.0, 7.25, 7.25, 7.5],
@@ -173,35 +134,23 @@ BEYOND: dict[str, EvaluationScenario] = {
         drop_bar=(0.0, 0.3),
     ),
     **{f"rest of {seconds} s": _rest(seconds) for seconds in (8, 20, 40, 80)},
-    "60 s at rest": EvaluationScenario(
-        meaning="nothing is drawn at all: every needless opening remains as overshoot",
-        options={"scenario": "none"},
-        duration=60.0,
-    ),
+    # Every needless opening remains as overshoot.
+    "60 s at rest": EvaluationScenario(options={"scenario": "none"}, duration=60.0),
     "starved": _situation(
-        "supply 1 to 2 bar below the target, refilled within a second from 3 s on",
         conditions={"starved": 1.0, "starved_bar": (1.0, 2.0), "starved_s": 3.0},
         drop_bar=(1.0, 2.0),
         settling_time=3.0 + REFILL_TIME,
         scenario="none",
     ),
-    "8 g/s": _situation(
-        "sudden applications of 8 g/s: training ends at 5.5 g/s",
-        scenario=consumption("steps", flow=(8.0, 8.0)),
-    ),
-    "restart": EvaluationScenario(meaning="the control unit restarts at 5 s", restart_s=5.0),
-    "p3 frozen": _situation(
-        "the reading of p3 stops changing at 2 s", conditions={"frozen_p3": 1.0, "frozen_p3_s": 2.0}
-    ),
-    "p2 biased": _situation(
-        "the reading of p2 is 0.256 bar too high (Table 1: 1.6 % of 16 bar)",
-        effects={"pressure_sensor_bias": {"b_p2": 25.6e3}},
-    ),
-    "latency of 5 ms": _situation(
-        "the coil follows its command after 5 ms", effects={"command_delay": 5e-3}
-    ),
-    "period of 4 ms": _situation("a decision every 4 ms instead of 5", control_period=4e-3),
-    "period of 6 ms": _situation("a decision every 6 ms instead of 5", control_period=6e-3),
+    # Training ends at 5.5 g/s.
+    "8 g/s": _situation(scenario=consumption("steps", flow=(8.0, 8.0))),
+    "restart": EvaluationScenario(restart_s=5.0),
+    "p3 frozen": _situation(conditions={"frozen_p3": 1.0, "frozen_p3_s": 2.0}),
+    # Table 1 allows 1.6 % of 16 bar.
+    "p2 biased": _situation(effects={"pressure_sensor_bias": {"b_p2": 25.6e3}}),
+    "latency of 5 ms": _situation(effects={"command_delay": 5e-3}),
+    "period of 4 ms": _situation(control_period=4e-3),
+    "period of 6 ms": _situation(control_period=6e-3),
 }
 """Scenarios beyond training by name; plants within ±10 % (TUNING_REGION)."""
 
@@ -246,10 +195,7 @@ def worn_scenarios() -> dict[str, EvaluationScenario]:
     """A scenario for each effect of the catalogue, variant and sign, at its typical size."""
     owners = {symbol: effect.name for effect in EFFECTS for symbol in effect.symbols}
     return {
-        f"worn: {name}": _situation(
-            "the valve or its sensors have this effect at its typical size",
-            effects={owners[next(iter(sizes))]: sizes},
-        )
+        f"worn: {name}": _situation(effects={owners[next(iter(sizes))]: sizes})
         for name, level, sizes in effect_levels()
         if level == "typical"
     }

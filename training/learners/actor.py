@@ -8,7 +8,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.torch_layers import MlpExtractor
 
-from controllers.policy_files import Network
+from controllers.network import Network
 
 TRUST = 1.5
 """Weight of the advice in the logits before training [1]: the policy follows it in 95 % of periods."""

@@ -188,7 +188,7 @@ class Course(BaseCallback):
         assert isinstance(self.model, PPO)
         network = network_of(self.model)
         policy = Policy(network=network, plant=self._task.plant)
-        metrics, _ = run_episodes(policy, **self._validation)
+        metrics = run_episodes(policy, **self._validation)
         row = {
             "timesteps": float(self.num_timesteps),
             "score": score(metrics),

@@ -1,6 +1,7 @@
 """Controllers on the same unseen episodes: figures, differences paired by episode, and a picture."""
 
 from collections.abc import Collection, Mapping
+from itertools import product
 
 import numpy as np
 import pandas as pd
@@ -10,19 +11,15 @@ from controllers.base import Controller
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
-from training.evaluation.batches import Batch, in_batches, run_batches
+from training.evaluation.batches import Batch, run_batches
 from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
 from training.evaluation.plots import in_words, plt
 from training.evaluation.scenarios import EvaluationScenario
 from training.evaluation.seeds import EVALUATION_SEED
 from training.evaluation.statistics import paired_difference
 
-PLANTS = {
-    "calibrated": "the calibrated plant",
-    "confidence": "drawn from its confidence region (C3)",
-    "sensitive_ten_percent": "all 13 sensitive parameters each within ±10 % (C3)",
-}
-"""The plant sets on which controllers are compared."""
+PLANTS = ("calibrated", "confidence", "sensitive_ten_percent")
+"""The plant sets on which controllers are compared: the plant itself, and regions around it (C3)."""
 
 Results = dict[tuple[str, str, str], EpisodeMetrics]
 """Episodes by plant set, scenario and controller."""
@@ -54,7 +51,7 @@ COLUMNS = {
 
 
 def plant_region(plants: str, plant: Plant) -> Region:
-    """The region around a plant that a key of PLANTS, or a region's name, stands for."""
+    """The region around a plant that one of PLANTS, or a region's name, stands for."""
     if plants == "calibrated":
         return Region(centre=plant.parameters)
     if plants == "confidence":
@@ -69,9 +66,9 @@ def compare(
     scenarios: Mapping[str, EvaluationScenario],
     episodes: int,
     duration: float,
-    plant_sets: Collection[str] = tuple(PLANTS),
+    plant_sets: Collection[str] = PLANTS,
     first_seed: int = EVALUATION_SEED,
-    workers: int = 1,
+    workers: int | None = 1,
     journal: Journal | None = None,
     digests: Mapping[str, str] = {},
     device: str = "cpu",
@@ -84,40 +81,30 @@ def compare(
         scenarios: by name.
         episodes: number of episodes of each cell.
         duration: length of an episode, where the scenario has none of its own [s].
-        plant_sets: keys of PLANTS.
+        plant_sets: some of PLANTS, or names of regions.
         first_seed: of the episodes of each cell.
-        workers: processes.
+        workers: processes; None: one for each core.
         journal: finished batches; new ones are added.
         digests: of the controllers by label: part of the batches' names in the journal.
         device: of the plants: "cpu", or "cuda" for an accelerator.
     """
-    cells: dict[tuple[str, str, str], list[Batch]] = {}
-    for plants in plant_sets:
-        for name, scenario in scenarios.items():
-            for label in controllers:
-                whole = Batch(
-                    name=f"{plants}, {name}, {label} {digests.get(label, '')}".rstrip(),
-                    controller=label,
-                    first_seed=first_seed,
-                    episodes=episodes,
-                    duration=scenario.duration or duration,
-                    options={
-                        "plant": plant,
-                        "parameters": plant_region(plants, plant),
-                        **scenario.options,
-                    },
-                    restart_s=scenario.restart_s,
-                    device=device,
-                )
-                cells[plants, name, label] = in_batches(episodes, whole)
-    found = run_batches(
-        [batch for batches in cells.values() for batch in batches], controllers,
-        journal=journal, workers=workers, what="comparison",
-    )  # fmt: skip
-    return {
-        cell: EpisodeMetrics.joined([found[batch.name] for batch in batches])
-        for cell, batches in cells.items()
-    }
+    cells: dict[tuple[str, str, str], Batch] = {}
+    for plants, (name, scenario), label in product(plant_sets, scenarios.items(), controllers):
+        region = plant_region(plants, plant)
+        cells[plants, name, label] = Batch(
+            name=f"{plants}, {name}, {label} {digests.get(label, '')}".rstrip(),
+            controller=label,
+            first_seed=first_seed,
+            episodes=episodes,
+            duration=scenario.duration or duration,
+            options={"plant": plant, "parameters": region, **scenario.options},
+            restart_s=scenario.restart_s,
+            device=device,
+        )
+    metrics = run_batches(
+        list(cells.values()), controllers, journal=journal, workers=workers, what="comparison"
+    )
+    return dict(zip(cells, metrics, strict=True))
 
 
 def rows(results: Results) -> pd.DataFrame:

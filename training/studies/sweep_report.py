@@ -105,37 +105,32 @@ def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
 
 
 def share_figure(points: pd.DataFrame, designs: Sequence[str]) -> Figure:
-    """Share that leaves by what is changed, a colour for each controller; exact 95 % intervals.
+    """Share that leaves under each controller with its exact 95 % interval, where a change hurts it.
 
-    points: of `point_table`. designs: those shown, each at its SHOWN_LEVELS. Of changes of one thing,
-    those that hurt a controller are drawn; the title says how many do not.
+    points: of `point_table`. designs: those shown, each at its SHOWN_LEVELS. The legend counts the
+    changes of one thing that hurt; regions are drawn for every controller.
     """
-    some: Any = points.assign(hurts=hurts(points) | (points["design"] == "regions"))
-    some = some[some["design"].isin(designs)]
+    some: Any = points.assign(hurts=hurts(points), region=points["design"] == "regions")
     shown = [
-        row["level"] in SHOWN_LEVELS.get(row["design"], (row["level"],))
+        row["design"] in designs and row["level"] in SHOWN_LEVELS.get(row["design"], (row["level"],))
         for row in some.to_dict("records")
     ]
     some = some[shown].assign(
         label=lambda rows: rows["factor"].map(in_words) + ": " + rows["level"].map(in_words)
     )
-    drawn: Any = some.groupby("label", sort=False)["hurts"].any()
-    labels = list(drawn[drawn].index)
-    controllers = list(dict.fromkeys(some["controller"]))
-    figure, axes = plt.subplots(figsize=(7.2, 1.6 + 0.3 * len(labels)), layout="constrained")
-    apart = 0.6 / max(len(controllers), 1)
-    for k, (name, colour) in enumerate(zip(controllers, COLOURS, strict=False)):
-        mine = some[some["controller"] == name].set_index("label").reindex(labels)
-        places = np.arange(len(labels)) + (k - (len(controllers) - 1) / 2) * apart
+    drawn: Any = some[some["hurts"] | some["region"]]
+    drawn = drawn.sort_values(["region", "left"], ascending=False, kind="stable")
+    labels = list(dict.fromkeys(drawn["label"]))
+    figure, axes = plt.subplots(figsize=(7.2, 1.6 + 0.27 * len(labels)), layout="constrained")
+    for name, colour in zip(dict.fromkeys(some["controller"]), COLOURS, strict=False):
+        mine, tried = (rows[rows["controller"] == name] for rows in (drawn, some[~some["region"]]))
+        places = [labels.index(label) for label in mine["label"]]
         axes.hlines(places, 100 * mine["left_low"], 100 * mine["left_high"], color=colour, alpha=0.5)
-        axes.plot(100 * mine["left"], places, "o", ms=4, color=colour, label=name)
-    axes.set_xscale("symlog", linthresh=1.0)
-    axes.set(xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals", xlim=(-0.1, 115))
-    axes.set_xticks([0, 1, 3, 10, 30, 100], ["0", "1", "3", "10", "30", "100"])
-    axes.set_yticks(np.arange(len(labels)), labels, fontsize=9)
+        text = f"{name}: {tried['hurts'].sum()} of {len(tried)} changes hurt"
+        axes.plot(100 * mine["left"], places, "o", ms=5, color=colour, label=text)
+    axes.set(xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals", xlim=(0, 101))
+    axes.set_yticks(range(len(labels)), labels, fontsize=9)
     axes.set_ylim(len(labels) - 0.4, -0.6)
-    if others := len(drawn) - len(labels):
-        axes.set_title(f"{others} other changes hurt no controller", fontsize=10)
     axes.grid(alpha=0.3, axis="x")
     figure.legend(ncols=2, loc="outside upper center", frameon=False)
     return figure

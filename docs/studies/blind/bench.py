@@ -25,29 +25,13 @@ from identification.report_2003 import SAMPLING_RATE
 from tests.reference.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
 from tests.reference.reference_simulation import simulate_reference
 
-SUPPLY_VOLTAGE = 24.0
-"""Coil voltage in every recording [V]: the driver's drop can hide behind the resistance."""
-
 SUITE = tuple(
-    replace(programme, U_on=SUPPLY_VOLTAGE)
+    replace(programme, U_on=24.0)
     for programme in DIAGNOSIS_SUITE
     if programme.name not in ("rest", "high_voltage")
 )
-"""The programmes of a campaign: nine recordings, two of them held out. A record at rest would remove a
-constant sensor bias, which is one of the effects."""
-
-SOLVERS = (("LSODA", 1e-6), ("LSODA", 1e-8), ("Radau", 1e-6), ("Radau", 1e-8))
-"""SciPy's methods with relative tolerances [-], tried in turn: LSODA's interpolant may lose an event."""
-
-SOLVER_EVALUATIONS = 3e5
-"""Most evaluations of the right-hand side for one recording [-]: a mover that chatters between sticking
-and slipping would need infinitely many."""
-
-WARM_UP_RECORDINGS = 3.0
-"""Recordings after which a winding is within 1/e of its highest temperature [-]."""
-
-WARMING_RANGE = (0.8, 1.2)
-"""Range of the winding's temperature relative to an even warming [-]."""
+"""The programmes of a campaign: nine recordings, two of them held out, all at one voltage, behind which
+the driver's drop can hide. A record at rest would remove a constant sensor bias, which is an effect."""
 
 NO_OFFSETS: dict[str, float] = {}
 """Offsets of the bench's own sensors. They are zeroed before the session, as a bias is an effect."""
@@ -106,9 +90,12 @@ def run_programme(
 
 
 def _start_temperature(trial: Trial, index: int, seed: int) -> float:
-    """Winding temperature above ambient when a recording begins [K]; rises unevenly in the session."""
-    uneven = np.random.default_rng([seed, trial.number, index, 4]).uniform(*WARMING_RANGE)
-    warmed = 1.0 - np.exp(-(index + 1) / WARM_UP_RECORDINGS)
+    """Winding temperature above ambient when a recording begins [K]; rises unevenly in the session.
+
+    After three recordings it is within 1/e of the highest temperature.
+    """
+    uneven = np.random.default_rng([seed, trial.number, index, 4]).uniform(0.8, 1.2)
+    warmed = 1.0 - np.exp(-(index + 1) / 3.0)
     return float(trial.winding_temperature_rise * uneven * warmed)
 
 
@@ -125,10 +112,14 @@ def _delayed(
 
 
 def _simulated(schedule: Schedule, time: NDArray, rates: RightHandSide) -> State:
-    """States at the times [s], (samples,), by the first solver that succeeds."""
+    """States at the times [s], (samples,), by the first solver that succeeds.
+
+    LSODA's interpolant may lose an event; a mover that chatters between sticking and slipping would need
+    infinitely many evaluations.
+    """
     failures = []
-    for method, rtol in SOLVERS:
-        own = {"method": method, "rtol": rtol, "most_evaluations": SOLVER_EVALUATIONS}
+    for method, rtol in (("LSODA", 1e-6), ("LSODA", 1e-8), ("Radau", 1e-6), ("Radau", 1e-8)):
+        own = {"method": method, "rtol": rtol, "most_evaluations": 3e5}
         try:
             return simulate_reference(schedule, time, right_hand_side=rates, **own).state
         except (ValueError, RuntimeError) as error:

@@ -25,16 +25,6 @@ from identification.valve_gap.causes import PARAMETER_COMPONENTS
 DIFFERENCE_STEP = 1e-4
 """Relative change of a parameter for a finite difference [-]."""
 
-FIT_TOLERANCE, FIT_EVALUATIONS = 1e-4, 20
-"""Relative change of the sum of squares, or of the parameters, at which a fit ends, and its most steps
-[-]."""
-
-LOST_RESIDUAL = 1e3
-"""Residual of samples that a model does not reach [noise deviations]."""
-
-TEMPERATURE_TOLERANCE = 0.01
-"""Tolerance of the fitted winding temperature [K]."""
-
 
 def explainable_gap(trial: Trial, truths: Sequence[TrueSignals]) -> float:
     """Noise-free gap with all parameters fitted within their scatter [-].
@@ -68,9 +58,9 @@ def recalibrated_parameters(truths: Sequence[TrueSignals]) -> Parameters:
         np.ones(len(vector.symbols)),
         jac=derivatives,  # type: ignore[arg-type]
         bounds=vector.bounds.T,
-        xtol=FIT_TOLERANCE,
-        ftol=FIT_TOLERANCE,
-        max_nfev=FIT_EVALUATIONS,
+        xtol=1e-4,
+        ftol=1e-4,
+        max_nfev=20,
     )
     return vector.parameters(fit.x)
 
@@ -110,7 +100,7 @@ class _Comparison:
                 self.replay.outputs(values), self.true, self.weights, strict=True
             )
         ]
-        return np.nan_to_num(np.vstack(each), nan=LOST_RESIDUAL)
+        return np.nan_to_num(np.vstack(each), nan=1e3)  # a model that fails is far off
 
     def squares(self, theta: float) -> NDArray:
         """Squared residuals (residuals,) where the windings start at a temperature [K above ambient]."""
@@ -146,6 +136,6 @@ def _best_temperature(comparison: _Comparison) -> float:
         lambda theta: float(np.sum(comparison.squares(theta))),
         bounds=table()["theta_coil"].domain or (0.0, 0.0),
         method="bounded",
-        options={"xatol": TEMPERATURE_TOLERANCE},
+        options={"xatol": 0.01},
     )
     return float(found.x)  # type: ignore[attr-defined]

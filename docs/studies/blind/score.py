@@ -27,23 +27,12 @@ from identification.valve_gap.causes import PARAMETER_COMPONENTS
 NAMING_VERDICTS = ("known", "ambiguous", "partial")
 """Verdicts that name a cause."""
 
-HELD_PROBABILITY = 0.9
-"""Probability of being part of the truth from which an effect counts as held, and is named by the
-verdict `partial` [-]: the contract's."""
-
-TIE_MARGIN = 1e-3
-"""Difference of probability up to which two causes are tied [-]: no one acts on less."""
-
 LEAST_INCLUSION = 0.01
 """Least probability of an effect that counts as a statement about it [-]: below lie thousands of effects
 that nobody would look at, whose truth would drown the rest."""
 
 BINS = 10
 """Of a reliability diagram [-]: with 300 answers the fullest ones still have narrow intervals."""
-
-BOOTSTRAP_DRAWS = 2000
-"""Draws of trials for the interval of a calibration error [-]: its ends are then stable to some percent
-of its width."""
 
 FIRST, INCLUSION = "first cause", "inclusion of an effect"
 """Statements whose probabilities are compared with what was true: the first listed cause, where the
@@ -88,9 +77,9 @@ def score_trial(label: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -
 
 
 def held_effects(diagnosis: Mapping[str, Any]) -> tuple[str, ...]:
-    """Effects that are surely part of the truth, the surest first."""
+    """Effects that are surely part of the truth, the surest first; the verdict `partial` names them."""
     found = diagnosis.get("inclusion", {})
-    held = [name for name, probability in found.items() if probability >= HELD_PROBABILITY]
+    held = [name for name, probability in found.items() if probability >= 0.9]
     return tuple(sorted(held, key=lambda name: -found[name]))
 
 
@@ -122,7 +111,7 @@ def is_tied(label: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> bool:
     causes = diagnosis.get("causes", [])
     if diagnosis["verdict"] not in ("known", "ambiguous") or len(causes) < 2:
         return False
-    least = causes[0]["probability"] - TIE_MARGIN
+    least = causes[0]["probability"] - 1e-3  # no one acts on less
     rivals = [cause for cause in causes[1:] if cause["probability"] >= least]
     return any(not is_correct(label, cause["effects"]) for cause in rivals)
 
@@ -248,7 +237,7 @@ def calibration_error(probability: NDArray, right: NDArray) -> dict[str, Any]:
     n = len(probability)
     if not n:
         return {"value": None}
-    draws = np.random.default_rng(0).integers(n, size=(BOOTSTRAP_DRAWS, n))
+    draws = np.random.default_rng(0).integers(n, size=(2000, n))
     errors = [expected_calibration_error(probability[draw], right[draw]) for draw in draws]
     low, high = np.percentile(errors, [2.5, 97.5])
     value = expected_calibration_error(probability, right)

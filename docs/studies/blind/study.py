@@ -37,8 +37,9 @@ from docs.studies.blind.truth import (
     trial_plan,
 )
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from epv_env.common.command_line import COUNT, add_seed, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_json, write_text
+from epv_env.common.options import COUNT, SEED
 from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
 from identification.bench.programmes import Programme
@@ -52,13 +53,9 @@ TRIALS, QUICK = 300, 2
 QUICK_SUITE = tuple(p for p in SUITE if p.name in ("test1", "validation", "low_supply"))
 """Recordings of a campaign under --quick."""
 CAMPAIGN, DIAGNOSIS, LABEL, COMMITMENTS = "campaign", "diagnosis", "sealed.json", "commitments.sha256"
-SALT_BYTES = 16
-"""Length of the salt in a label [bytes]: its hash tells nothing of the content."""
 EXPLAINABLE = 1.02
 """Noise-free gap after recalibration below which nothing is left to explain [-]; `no_gap` is then the
 correct verdict."""
-ATTEMPTS = 5
-"""Draws of a trial with the same causes before the study gives up [-]."""
 AT_LEAST = {
     "Truth in the ambiguity set": {"usual": 0.96, "strong": 0.92},
     "First cause right (a tie counts as wrong)": {"usual": 0.92, "strong": 0.85},
@@ -125,7 +122,7 @@ def generate_trial(
 
     Raises RuntimeError where no solver follows any of the valves drawn with these causes.
     """
-    for attempt in range(ATTEMPTS):
+    for attempt in range(5):
         trial = draw_trial(seed, number, kind, causes, forms, attempt)
         try:
             truths = true_recordings(trial, seed, suite)
@@ -166,7 +163,8 @@ def truth_label(trial: Trial, gap: float, alone: Mapping[str, float], *, seed: i
         "parameters": dict(trial.parameters),
         "gap": {"explainable": gap},
         "gap_alone": dict(alone),
-        "salt": np.random.default_rng([seed, trial.number, 0, 5]).bytes(SALT_BYTES).hex(),
+        # So that the hash tells nothing of the content.
+        "salt": np.random.default_rng([seed, trial.number, 0, 5]).bytes(16).hex(),
     }
 
 
@@ -248,7 +246,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
     parser.add_argument("--trials", type=COUNT, default=TRIALS, help="number of campaigns")
-    add_seed(parser, help="of truths and noise")
+    parser.add_argument("--seed", type=SEED, default=0, help="of truths and noise")
     ranges = [f"{name} {100 * a:.0f} to {100 * b:.0f} %%" for name, (a, b) in FORM_DEVIATIONS.items()]
     parser.add_argument(
         "--forms",

@@ -30,9 +30,6 @@ PARAMETER = "parameter:"
 KIND_COUNTS = {NOMINAL: 10, ONE_CAUSE: 25, TWO_EFFECTS: 6, EXCLUDED_EFFECT: 9}
 """Trials of each kind among every fifty [-]."""
 
-EFFECT_COPIES = 3
-"""Draws of each effect for one draw of each parameter [-], among the trials with one cause."""
-
 CALIBRATED_SPREAD = 0.06
 """Half width of the four calibrated parameters about Table 12 [-], relative, uniform."""
 
@@ -56,12 +53,6 @@ there these three were missed on campaigns of another simulator."""
 
 TOP_SHARE = 0.3
 """Probability that such an effect is drawn at its top [-]: about two trials each of 300."""
-
-PARAMETER_OFF = (0.015, 0.05)
-"""How far a parameter is off that is the cause, as a share of its table value; either sign."""
-
-WARMEST = (1.0, 20.0)
-"""How warm a winding that heats becomes over a session [K], log-uniform."""
 
 EFFECTS = tuple(CATALOGUE)
 
@@ -114,7 +105,7 @@ def trial_plan(seed: int, trials: int) -> list[tuple[str, tuple[str, ...]]]:
     """
     kind_deck = [kind for kind, count in KIND_COUNTS.items() for _ in range(count)]
     parameters = tuple(PARAMETER + symbol for symbol in PARAMETER_COMPONENTS)
-    decks = (kind_deck, EFFECTS * EFFECT_COPIES + parameters, EFFECTS, EFFECTS)
+    decks = (kind_deck, EFFECTS * 3 + parameters, EFFECTS, EFFECTS)
     kinds, single, excluded, pair = (
         _dealt(deck, np.random.default_rng([seed, index, 1])) for index, deck in enumerate(decks)
     )
@@ -148,11 +139,11 @@ def draw_trial(
             chosen = variants[int(rng.integers(len(variants)))]
             sizes |= {size.symbol: size.draw(rng, size.drawn or (0.0, 0.0)) for size in chosen}
         else:
-            share = rng.uniform(*PARAMETER_OFF)
+            share = rng.uniform(0.015, 0.05)
             off = 1.0 + (-share if rng.uniform() < 0.5 else share)
             sizes[symbol] = Parameters.calibrated()[symbol] * off
     deviation = rng.uniform(*FORM_DEVIATIONS[forms])
-    temperature_rise = np.exp(rng.uniform(*np.log(WARMEST)))
+    temperature_rise = np.exp(rng.uniform(*np.log((1.0, 20.0))))  # K, over a session
     # Drawn last: the draws above stay those of a study without other forms.
     other_forms = _some(causes, OTHER_FORMS, OTHER_FORM_SHARE, rng)
     for name in _some(causes, TOP_EFFECTS, TOP_SHARE, rng):

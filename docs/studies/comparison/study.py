@@ -15,17 +15,17 @@ import pandas as pd
 
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.commands import parse
+from epv_env.common.options import parse
 from training.commands import compare
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
-    f"PPO={ROOT / 'controllers' / 'trained'}",
-    "pulse, adaptive, with rules",
-    "pulse, adaptive",
-    "hysteresis, extrapolating",
+    "PPO",
+    "adaptive pulse with rules",
+    "adaptive pulse",
+    "extrapolating hysteresis",
     "PWM",
-    "pulse, informed",
+    "informed pulse",
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""

@@ -34,7 +34,7 @@ from identification.confidence.confidence import report_interval
 from identification.confidence.covariance import estimate_covariance
 
 FOLDER = Path(__file__).parent
-CAMPAIGNS, QUICK = 200, 2
+CAMPAIGNS, QUICK = 200, 1
 """Campaigns: a coverage of 0.95 is then known to about ±0.03."""
 PROBABILITY = 0.95
 """Of the intervals and regions [-]."""

@@ -13,19 +13,17 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import gymnasium
 import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
-import epv_env  # noqa: F401 - registers the environments
 from controllers.policy import load_policy
 from docs.studies.blind.forms import deviating_sizes
 from docs.studies.blind.score import named_cause, named_set
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from epv_env.common.command_line import COUNT, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal
-from epv_env.operation_log import OperationLog
+from epv_env.common.options import COUNT
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at
 from epv_env.plant.plantfile import Plant
@@ -36,13 +34,14 @@ from identification.gap.report.gap_json import as_json
 from identification.recordings.log_files import read_log
 from identification.recordings.openings import drive_of, openings
 from identification.valve_gap.operation import diagnose_log
+from training.drives import write_log
 
 FOLDER = Path(__file__).parent
 SEED = 4931
 VALVES, WITHOUT = 100, 5
 """Valves; every fifth has no effect."""
-DRIVES, QUICK, PERIODS = 10, 2, 6000
-"""Drives of a valve, the same under --quick, and control periods of a drive: five minutes in all."""
+DRIVES, QUICK, DURATION = 10, 2, 30.0
+"""Drives of a valve, the same under --quick, and length of a drive [s]: five minutes in all."""
 SPREAD, SIZES, DEVIATIONS = (0.94, 1.06), (1.0, 2.0), (0.2, 0.5)
 """Ranges of the calibrated parameters, as shares of the report's; of an effect's size, in sizes from
 which a fit begins; and of the deviation of its law [1]."""
@@ -71,23 +70,14 @@ def drawn(number: int, drives: int = DRIVES) -> dict[str, Any]:
     return valve | own | {"deviation": deviation, "onset": onset}
 
 
-def write_log(valve: dict[str, Any], folder: Path) -> None:
+def log_drives(valve: dict[str, Any], folder: Path) -> None:
     """Drive a valve and log it."""
     plant, policy = Plant.calibrated(), load_policy()
     plant = replace(plant, parameters=plant.parameters.replace(**valve["parameters"]))
-    made = gymnasium.make("EPValve-v0", plant=plant, scenario="mixed", max_episode_steps=PERIODS)
-    env = OperationLog(made, folder)
-    for number, seed in enumerate(valve["seeds"]):
-        effects = valve["effects"] if number >= valve["onset"] else {}
-        observation, _ = env.reset(seed=seed, options={"effects": effects})
-        deviate(env.valve.task.valves, valve["deviation"])
-        policy.reset(1)
-        over = False
-        while not over:
-            action = int(policy.act(observation[None])[0])
-            observation, _, failed, out_of_time, _ = env.step(action)
-            over = failed or out_of_time
-    env.close()
+    write_log(
+        folder, policy, plant, valve["seeds"], duration=DURATION, effects=valve["effects"],
+        onset=valve["onset"], begun=lambda valves: deviate(valves, valve["deviation"]),
+    )  # fmt: skip
 
 
 def deviate(valves: Valves, deviation: float) -> None:
@@ -118,7 +108,7 @@ def answer(valve: dict[str, Any], folder: Path) -> dict[str, Any]:
     log, driven = folder / "log", folder / "driven"
     if not driven.exists():
         shutil.rmtree(log, ignore_errors=True)
-        write_log(valve, log)
+        log_drives(valve, log)
         driven.touch()
     return judged(valve, log, as_json(diagnose_log(log, folder / "out", report=False)))
 

@@ -26,7 +26,8 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
-from training.monitoring import DRIVE, drives, monitor_model
+from training.drives import DRIVE, drives
+from training.monitoring import monitor_model
 
 FOLDER = Path(__file__).parent
 SEED = 4977

@@ -9,11 +9,11 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from controllers.base import Controller
-from controllers.held_readings import readings_of
 from epv_env.observation import HISTORY, LAYOUT, P2_LAGS, P3_LAGS, decode, encode
 from epv_env.plant.channels import CURRENT, P1, P2, P3
 from epv_env.result import DEVIATION
 from epv_env.reward import BAND_BAR
+from training.deploy.compiled import readings_of
 from training.evaluation.rollout import begin_episodes, make_env
 
 CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT}

@@ -19,9 +19,9 @@ import numpy as np
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import policy_digest
 from docs.studies.common import PAGE, fill, table
-from epv_env.common.command_line import COUNT, add_workers, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, read_json
-from epv_env.plant.valves import available_cores
+from epv_env.common.options import COUNT
 from training.evaluation.batches import run_jobs
 from training.evaluation.metrics import violation_interval
 from training.evaluation.plots import in_words
@@ -69,7 +69,7 @@ def announced() -> Statement:
 
 def batch(statement: Statement, region: str, first: int) -> dict[str, Any]:
     """Figures of the episodes of BATCH seeds from `first` on."""
-    metrics, _ = run_episodes(
+    metrics = run_episodes(
         load_policy(), seeds=list(range(first, first + BATCH)), duration=statement.duration_s,
         options={"threads": 1, "scenario": statement.scenario, "parameters": region},
     )  # fmt: skip
@@ -127,7 +127,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is missing; returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--episodes", type=COUNT, help="of each region, from the first (default: all)")
-    add_workers(parser)
+    parser.add_argument("--workers", type=COUNT, help="processes (default: all cores)")
     options = parser.parse_args(arguments)
     statement = announced()
     journal = Journal(RESULTS, {"statement": vars(statement)})
@@ -138,7 +138,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name, first in list(names(statement, region).items())[:count]
     ]
     jobs = {name: partial(batch, statement, region, first) for name, region, first in seeds}
-    run_jobs(jobs, journal=journal, workers=options.workers or available_cores(), what="statement")
+    run_jobs(jobs, journal=journal, workers=options.workers, what="statement")
     text = page_table(statement, journal)
     fill(FOLDER / PAGE, {"statement": text})
     print(text)

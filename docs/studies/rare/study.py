@@ -20,15 +20,15 @@ from controllers.tuned import tuned
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from docs.studies.rare.sensors import SINGLE, fault_table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.commands import parse
+from epv_env.common.options import parse
 from training.commands import rare
 from training.evaluation.seeds import RANGE, STATEMENT_SEED
 
 FOLDER = Path(__file__).parent
 RUNS: dict[str, tuple[str, ...]] = {
-    "hyst-ten": ("--controller", "hysteresis, extrapolating"),
-    "pulse-ten": ("--controller", "pulse, adaptive"),
-    "rules-ten": ("--controller", "pulse, adaptive, with rules"),
+    "hyst-ten": ("--controller", "extrapolating hysteresis"),
+    "pulse-ten": ("--controller", "adaptive pulse"),
+    "rules-ten": ("--controller", "adaptive pulse with rules"),
     "ppo-ten": (),
     "ppo-conf": ("--region", "confidence", "--least", "1e-6"),
 }
@@ -37,7 +37,7 @@ SIZE = ("--particles", "256", "--repetitions", "6")
 FAULT_EPISODES = 12
 """Of each fault alone; a quarter of it of each pair."""
 FAULT_SEED = STATEMENT_SEED + RANGE
-BEHIND = ("pulse, adaptive", "hysteresis, extrapolating")
+BEHIND = ("adaptive pulse", "extrapolating hysteresis")
 """Controllers whose sensors fail beside the policy's."""
 
 

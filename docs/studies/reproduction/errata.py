@@ -1,39 +1,52 @@
-"""A printed figure checked against the report's others; checks of parameters and error tables."""
+"""Printed figures of the report checked against its others: noise (Tables 1 to 4), errors (11, 13)."""
 
-import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from itertools import combinations
 
 import numpy as np
 from scipy import stats
 
-from epv_env.plant.parameters import Parameters, confidence_intervals, table
-from identification.recordings.recording import OUTPUTS
-from identification.report_2003 import (
-    CALIBRATION_CASES,
-    SAMPLING_RATE,
-    printed_errors,
-    printed_sensitivities,
-    printed_total,
-    total_error,
-)
-from identification.sensitivity.one_at_a_time import FACTORS
+from epv_env.plant.channels import SENSORS
+from identification.quality.channel import DescriptiveStatistics
+from identification.recordings.recording import UNITS
+from identification.report_2003 import correlation_matrix, printed_errors, printed_total, total_error
 
-HOLDS, ERRATUM, DOUBT = "holds", "slip", "doubt"
-"""Values of `status` in reproduce.json.
+HOLDS, ERRATUM = "holds", "slip"
+"""Values of `status` in reproduce.json: the printed figures agree, or contradict each other."""
 
-HOLDS: the printed figures agree. ERRATUM: they contradict each other. DOUBT: they are hard to believe
-together.
-"""
+REPORT_CHANNELS = ("I", "U", "p1", "p2", "p3")
+"""Channels of the report's bench, in the order of Table 1."""
 
-ERROR_ROUNDING = 1.5e-4
-"""Tolerance of a root of squares of errors that are printed to 1e-4 [%]."""
-IMPROVEMENT_ROUNDING = 0.01
-"""Tolerance of a relative fall of the total error [%], printed to two digits here."""
-CONFIDENCE = 0.95
-"""Confidence of the band of a correlation, and probability of the F quantile of eq. 23 [-]."""
-CENTRAL_POSITIONS = (0.25, 0.75)
-"""Positions of an estimate in its confidence interval, from 0 at the lower to 1 at the upper end, that
-are no doubt."""
+TREND_SLOPES = {"I": -6e-6, "U": 5.8e-5, "p1": 7.9e-5, "p2": -1.16e-4, "p3": -8.2e-5}
+"""Table 2 [unit/s]."""
+
+TREND_OFFSETS = {"I": -0.000235, "U": 0.001837, "p1": 1.000909, "p2": 0.99272, "p3": 0.996888}
+"""Table 2 [unit]."""
+
+_TABLE_3 = {
+    "I": (0.0, 0.0, 0.0003, 0.0008, 0.001, 0.0006, 0.0049, 62.916, 3.513, 2.5794, 0.0825),
+    "U": (0.0, -0.0001, -0.0009, 0.0122, 0.016, 0.0089, 0.0921, 66.953, 3.8362, 2.7138, 0.0972),
+    "p1": (0.0, 0.0, 0.0007, 0.0068, 0.0074, 0.0055, 0.0507, 67.227, 3.7353, 3.052, 0.0583),
+    "p2": (0.0, 0.0, 0.0017, 0.0098, 0.0093, 0.0078, 0.0733, 64.25, 3.9119, 3.1001, 0.0193),
+    "p3": (0.0, 0.0, -0.0044, 0.0075, 0.0093, 0.0065, 0.0459, 66.995, 3.0882, 2.6351, 0.115),
+}
+
+STATISTICS = {
+    name: DescriptiveStatistics(
+        **{field.name: value for field, value in zip(fields(DescriptiveStatistics), column, strict=True)}
+    )
+    for name, column in _TABLE_3.items()
+}
+"""Table 3 by channel."""
+
+CORRELATIONS = {
+    (REPORT_CHANNELS[row], REPORT_CHANNELS[column]): correlation_matrix()[row][column]
+    for row, column in combinations(range(len(REPORT_CHANNELS)), 2)
+}
+"""Table 4, above the diagonal."""
+
+SAMPLES = 10_000
+"""Of the report's record: 5 s at 2000 Hz."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,109 +63,28 @@ class FigureCheck:
     recomputed: str
     """The recomputed value, or what contradicts the printed one."""
     status: str
-    """HOLDS, ERRATUM or DOUBT."""
-    remark: str = ""
+    """HOLDS or ERRATUM."""
+    remark: str
     """What rule the recomputation uses, and what follows."""
 
 
-def numeric_check(
-    where: str, printed: float, recomputed: float, tolerance: float, *, digits: int = 4, remark: str = ""
-) -> FigureCheck:
-    """Check that two numbers of the same unit differ by at most `tolerance`; else ERRATUM.
-
-    Args:
-        where: table and quantity, with the unit.
-        printed: the report's number.
-        recomputed: the number that the report's other figures give, in the same unit.
-        tolerance: what the rounding of the figures behind them allows, in the same unit.
-        digits: decimals that are shown.
-        remark: what rule the recomputation uses.
-    """
-    return FigureCheck(
-        where=where,
-        printed=f"{printed:.{digits}f}",
-        recomputed=f"{recomputed:.{digits}f}",
-        status=HOLDS if abs(printed - recomputed) <= tolerance else ERRATUM,
-        remark=remark,
-    )
-
-
-PRINTED_PERMEABILITY = 4 * math.pi * 1e7
-"""Permeability of vacuum in Table 5 [V s/(A m)]."""
-
-PRINTED_SIGNALS = ("I", "U", "p2", "p2", "p3")
-"""'five acquired signals that are as follows' (section 3)."""
-
-
-def parameter_checks() -> list[FigureCheck]:
-    """Checks of sections 3, 5.1 and 6 that do not all hold."""
+def figure_checks() -> list[FigureCheck]:
+    """All checks in the order of the report's sections."""
     return [
-        _permeability(),
-        *(_position(symbol) for symbol in confidence_intervals()),
-        _degrees_of_freedom(),
-        _signals(),
+        *(_signal_to_noise(name) for name in REPORT_CHANNELS),
+        _claimed_signal_to_noise(),
+        _correlations(),
+        *(_total_error(number) for number in (11, 13)),
+        _improvement(),
     ]
 
 
-def measurement_points() -> int:
-    """Samples of all outputs in the four calibration tests."""
-    return len(OUTPUTS) * sum(len(case.voltage(1.0, SAMPLING_RATE)) for case in CALIBRATION_CASES)
+def signal_to_noise(name: str, deviation: float) -> float:
+    """Signal-to-noise ratio by eq. 17 with Table 1's greatest value [dB].
 
-
-def _permeability() -> FigureCheck:
-    true = table()["mu0"].value
-    return FigureCheck(
-        where="Table 5, permeability of vacuum [V s/(A m)]",
-        printed=f"{PRINTED_PERMEABILITY:.4g}",
-        recomputed=f"{true:.4g}",
-        status=HOLDS if math.isclose(PRINTED_PERMEABILITY, true) else ERRATUM,
-        remark="10^7 for 1e-7: the printed value is "
-        f"{PRINTED_PERMEABILITY / true:.0e} times the constant",
-    )
-
-
-def interval_position(symbol: str) -> float:
-    """Position of Table 12's estimate in Table 14's interval [-]: 0 at the lower end, 1 at the upper."""
-    low, high = confidence_intervals()[symbol]
-    return (Parameters.calibrated()[symbol] - low) / (high - low)
-
-
-def _position(symbol: str) -> FigureCheck:
-    position, (low, high) = interval_position(symbol), confidence_intervals()[symbol]
-    least, most = CENTRAL_POSITIONS
-    return FigureCheck(
-        where=f"Tables 12 and 14, {symbol} in its 95 % interval",
-        printed=f"{Parameters.calibrated()[symbol]:.7g} in [{low:.7g}, {high:.7g}]",
-        recomputed=f"at {100 * position:.1f} % of the interval",
-        status=HOLDS if least <= position <= most else DOUBT,
-        remark="about 50 % at a smooth minimum: the interval reaches "
-        f"{position / (1 - position):.0f} times as far down as up",
-    )
-
-
-def _degrees_of_freedom() -> FigureCheck:
-    k, v = measurement_points(), len(confidence_intervals())
-    quantile = float(stats.f.ppf(CONFIDENCE, v, k - v))
-    factor = math.sqrt(1 + v / (k - v) * quantile)
-    return FigureCheck(
-        where="Eq. 23, degrees of freedom of F(k, v - k, p)",
-        printed=f"{k}, {v - k}",
-        recomputed=f"{v}, {k - v}",
-        status=ERRATUM if v - k < 0 else HOLDS,
-        remark="with k points and v parameters, as defined, v - k is negative; F(v, k - v, p) is meant: "
-        f"{quantile:.3f}. The bound holds for a sum of squares; for the root mean square of eq. 21 the "
-        f"factor is sqrt(1 + v/(k - v) F) = {factor:.6f}",
-    )
-
-
-def _signals() -> FigureCheck:
-    return FigureCheck(
-        where="Section 3, acquired signals",
-        printed=", ".join(PRINTED_SIGNALS),
-        recomputed="I, U, p1, p2, p3",
-        status=ERRATUM if len(set(PRINTED_SIGNALS)) < len(PRINTED_SIGNALS) else HOLDS,
-        remark="p2 stands twice and p1 is missing; Table 1 lists all five",
-    )
+    name: channel. deviation: standard deviation of its noise [A, V or bar].
+    """
+    return float(20 * np.log10(SENSORS[name].high / deviation))
 
 
 def recomputed_total(number: int) -> float:
@@ -160,52 +92,69 @@ def recomputed_total(number: int) -> float:
     return float(total_error([np.array(test["partial"]) for test in printed_errors(number).values()]))
 
 
-def error_table_checks() -> list[FigureCheck]:
-    """Checks of the error tables that do not all hold."""
-    return [
-        *(_total_error(number) for number in (11, 13)),
-        _improvement(),
-        _first_test_p2(),
-        _a1_sensitivity(),
-    ]
+def _signal_to_noise(name: str) -> FigureCheck:
+    """Printed SNR against what any standard deviation that rounds to the printed one can give."""
+    deviation, printed = STATISTICS[name].standard_deviation, STATISTICS[name].signal_to_noise
+    # Table 3 has four decimals.
+    low, high = (signal_to_noise(name, deviation + change) for change in (5e-5, -5e-5))
+    unit, greatest = UNITS[name][0], deviation * 10 ** (printed / 20)
+    return FigureCheck(
+        where=f"Table 3, SNR of {name} [dB]",
+        printed=f"{printed:.3f}",
+        recomputed=f"{low:.3f} to {high:.3f}",
+        status=HOLDS if low <= printed <= high else ERRATUM,
+        remark=f"eq. 17 with Table 1's greatest value, {SENSORS[name].high:g} {unit}; the printed SNR "
+        f"would take {greatest:.3g} {unit}",
+    )
+
+
+def _claimed_signal_to_noise() -> FigureCheck:
+    found = {
+        name: signal_to_noise(name, STATISTICS[name].standard_deviation) for name in REPORT_CHANNELS
+    }
+    least = min(found, key=lambda name: found[name])
+    return FigureCheck(
+        where="Section 4.1, SNR 'over 62 dB in all cases' [dB]",
+        printed="over 62",
+        recomputed=f"{found[least]:.2f} ({least})",
+        status=HOLDS if found[least] > 62.0 else ERRATUM,
+        remark="eq. 17 with the printed standard deviations",
+    )
+
+
+def _correlations() -> FigureCheck:
+    band = float(stats.norm.ppf(0.975) / np.sqrt(SAMPLES))
+    far = {pair: value for pair, value in CORRELATIONS.items() if abs(value) > band}
+    return FigureCheck(
+        where="Table 4, 'shows non-correlated data'",
+        printed="no pair correlated",
+        recomputed=f"{len(far)} of 10 pairs beyond ±{band:.4f}: "
+        + ", ".join(f"{a}-{b} {value:+.4f}" for (a, b), value in far.items()),
+        status=ERRATUM if len(far) > 1 else HOLDS,
+        remark=f"95 % band of independent white signals of {SAMPLES} samples; 1 in 20 may lie outside",
+    )
 
 
 def _total_error(number: int) -> FigureCheck:
-    where = f"Table {number}, total error [%]"
-    remark = "eq. 21 over the printed partial errors"
-    recomputed = recomputed_total(number)
-    return numeric_check(where, printed_total(number), recomputed, ERROR_ROUNDING, remark=remark)
+    printed, recomputed = printed_total(number), recomputed_total(number)
+    return FigureCheck(
+        where=f"Table {number}, total error [%]",
+        printed=f"{printed:.4f}",
+        recomputed=f"{recomputed:.4f}",
+        # Partial errors are printed to 1e-4.
+        status=HOLDS if abs(printed - recomputed) <= 1.5e-4 else ERRATUM,
+        remark="eq. 21 over the printed partial errors",
+    )
 
 
 def _improvement() -> FigureCheck:
     """The claim that rests on the total of Table 13."""
     before, after = printed_total(11), (printed_total(13), recomputed_total(13))
     printed, recomputed = (100 * (1 - total / before) for total in after)
-    remark = "what the calibration gained, with the printed and with the recomputed total"
-    where = "Tables 11 and 13, fall of the total error [% of it]"
-    return numeric_check(where, printed, recomputed, IMPROVEMENT_ROUNDING, digits=2, remark=remark)
-
-
-def _first_test_p2() -> FigureCheck:
-    before, after = (printed_errors(number)["Test1"]["p2"] for number in (11, 13))
     return FigureCheck(
-        where="Tables 11 and 13, Test1, error of p2 [%]",
-        printed=f"{before:.4f} before, {after:.4f} after",
-        recomputed="–",
-        status=DOUBT if after > before else HOLDS,
-        remark="the calibration makes p2, the output to be controlled, worse in the first test",
-    )
-
-
-def _a1_sensitivity() -> FigureCheck:
-    value = table()["a1"].value
-    changes = [factor * value - value for factor in FACTORS]
-    minus, plus = printed_sensitivities(9)["a1"]
-    return FigureCheck(
-        where="Table 9, a1, total error [%]",
-        printed=f"{minus:.4f} / {plus:.4f}",
-        recomputed="0.0000 / 0.0000",
-        status=ERRATUM if not any(changes) and max(minus, plus) > 0 else HOLDS,
-        remark="10 % of a1 = 0 is no change; with a1 at the ends of its domain about these errors come "
-        "out",
+        where="Tables 11 and 13, fall of the total error [% of it]",
+        printed=f"{printed:.2f}",
+        recomputed=f"{recomputed:.2f}",
+        status=HOLDS if abs(printed - recomputed) <= 0.01 else ERRATUM,
+        remark="what the calibration gained, with the printed and with the recomputed total",
     )

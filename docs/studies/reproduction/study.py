@@ -16,8 +16,7 @@ from typing import Any
 import numpy as np
 
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from docs.studies.reproduction.errata import ERRATUM, FigureCheck, error_table_checks, parameter_checks
-from docs.studies.reproduction.noise_errata import noise_checks
+from docs.studies.reproduction.errata import ERRATUM, figure_checks
 from docs.studies.reproduction.sensitivity_tables import run_one_at_a_time, sensitivity_tables
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_json
@@ -47,11 +46,6 @@ def reproduce(identification: Identification) -> dict[str, Any]:
         "virtual_bench": {"tables2to4": quality_json(quality), **_bench(identification)},
         "slips": [asdict(check) for check in figure_checks()],
     }
-
-
-def figure_checks() -> list[FigureCheck]:
-    """All checks in the order of the report's sections."""
-    return [*noise_checks(), *parameter_checks(), *error_table_checks()]
 
 
 def _bench(identification: Identification) -> dict[str, Any]:

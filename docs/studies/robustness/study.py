@@ -16,15 +16,15 @@ import pandas as pd
 
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.commands import parse
+from epv_env.common.options import parse
 from training.commands import sweep
 from training.studies.sweep_report import RANGE_ENDS, harmful_changes, region_table
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
-    f"PPO={ROOT / 'controllers' / 'trained'}",
-    "pulse, adaptive, with rules",
-    "hysteresis, extrapolating",
+    "PPO",
+    "adaptive pulse with rules",
+    "extrapolating hysteresis",
     "PWM",
 )
 """The learned one, the best classic one, a simple one, and the one that the report names."""

@@ -9,6 +9,7 @@ runs/sim_to_real and not repeated.
 import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -20,8 +21,9 @@ from controllers.base import Controller
 from docs.studies.blind.bench import NO_OFFSETS, SUITE, run_programme
 from docs.studies.blind.truth import draw_unit
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from epv_env.common.command_line import COUNT, fail_clearly
+from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, write_text
+from epv_env.common.options import COUNT
 from epv_env.episode import WORN
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant
@@ -209,6 +211,7 @@ def is_certain(plant: Plant) -> bool:
     return len(possible) == 1 and dict(possible[0].region.centre) == dict(plant.parameters)
 
 
+@cache
 def whole_catalogue() -> Mixture:
     """Plain domain randomisation: one or two effects of any kind, and ±10 % of the calibrated four."""
     rng, nominal = np.random.default_rng(SEED), Parameters.calibrated()
@@ -227,7 +230,7 @@ def measured(policy: Controller, case: Case, true: Plant, options: Any) -> dict[
         policy = UnevenLag(policy, case.unevenness)
     seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + options.episodes))
     own = {"plant": true, "scenario": SCENARIO}
-    metrics, _ = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
+    metrics = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
     return {
         "stayed": metrics.stayed.astype(float).tolist(),
         "rms_mbar": np.round(1e3 * metrics.rms_bar, 1).tolist(),

@@ -16,12 +16,6 @@ from identification.gap.fit.variable_projection import (
     without_run_nuisances,
 )
 
-BOUND_MARGIN = 1e-4
-"""Share of a range [1] within which a parameter counts as lying at the bound: rounding."""
-
-SMALLEST_EIGENVALUE = 1e-12
-"""Eigenvalue of a correlation matrix below which it is rounding [1]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class EvaluatedHypothesis:
@@ -62,7 +56,7 @@ class EvaluatedHypothesis:
     @property
     def titles(self) -> tuple[str, ...]:
         """The causes for people."""
-        return self.estimate.hypothesis.titles
+        return tuple(cause.title for cause in self.estimate.hypothesis.causes)
 
     @property
     def label(self) -> str:
@@ -129,15 +123,16 @@ def _covariance(equations: NormalEquations) -> NDArray:
     """Covariance of the scaled vector (k, k) [1]; wide, but finite, where the recordings say nothing."""
     size = np.sqrt(np.diag(equations.hessian) + 1e-9)  # a parameter may have no effect at all
     values, vectors = np.linalg.eigh(equations.hessian / np.outer(size, size))
-    root = vectors / np.sqrt(np.maximum(values, SMALLEST_EIGENVALUE)) / size[:, None]
+    root = vectors / np.sqrt(np.maximum(values, 1e-12)) / size[:, None]
     return root @ root.T  # symmetric to the last digit, which the product with the eigenvalues is not
 
 
 def _unusual(estimate: Estimate) -> bool:
     """Whether a cause's parameter lies at an end of its range and is not merely nominal there."""
-    for p, scaled in zip(estimate.hypothesis.cause_parameters, estimate.cause_vector, strict=True):
+    sizes = estimate.vector[estimate.cause_start :]
+    for p, scaled in zip(estimate.hypothesis.cause_parameters, sizes, strict=True):
         low, high = sorted((p.low, p.high))
-        value, margin = scaled * p.scale, BOUND_MARGIN * (high - low)
+        value, margin = scaled * p.scale, 1e-4 * (high - low)  # a margin for rounding
         if min(value - low, high - value) < margin and abs(value - p.nominal) > margin:
             return True
     return False

@@ -11,13 +11,6 @@ from epv_env.common.files import Journal
 from identification.gap.fit.laws import Law
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
 
-UNSTABLE = 1e9
-"""Weighted output [noise deviations] that only an unstable simulation gives: it counts as failed."""
-
-FAILED_RESIDUAL = 1e3
-"""Residual of a reading whose candidate cannot be simulated [noise deviations]: far above every residual
-of a usable candidate, so that the fit moves away."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Hypothesis:
@@ -46,11 +39,6 @@ class Hypothesis:
     def labels(self) -> tuple[str, ...]:
         """Labels of the causes."""
         return tuple(cause.label for cause in self.causes)
-
-    @property
-    def titles(self) -> tuple[str, ...]:
-        """The causes for people."""
-        return tuple(cause.title for cause in self.causes)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,11 +77,6 @@ class Estimate:
     def cause_start(self) -> int:
         """Index of the vector at which the parameters of the causes begin."""
         return len(self.vector) - len(self.hypothesis.cause_parameters)
-
-    @property
-    def cause_vector(self) -> NDArray:
-        """Scaled parameters of the causes, (parameters of causes,) [1]."""
-        return self.vector[self.cause_start :]
 
     @property
     def laws(self) -> list[tuple[Law, NDArray]]:
@@ -157,7 +140,21 @@ class FitCache:
             return self.journal.read(step, lambda found: [self._estimate(each) for each in found])
         estimates = fit()
         if self.journal is not None:
-            self.journal.add(step, [_entry(estimate) for estimate in estimates])
+            # Nuisance slopes are computed again.
+            entries = [
+                {
+                    "causes": list(estimate.hypothesis.labels),
+                    "vector": estimate.vector.tolist(),
+                    "local": estimate.run_values.tolist(),
+                    "chi_square": estimate.chi_square,
+                    "converged": estimate.converged,
+                    "laws": [
+                        [o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws
+                    ],
+                }
+                for estimate in estimates
+            ]
+            self.journal.add(step, entries)
         return estimates
 
     def _estimate(self, entry: dict[str, Any]) -> Estimate:
@@ -176,18 +173,6 @@ class FitCache:
             chi_square=entry["chi_square"],
             converged=entry["converged"],
         )
-
-
-def _entry(estimate: Estimate) -> dict[str, Any]:
-    """An estimate as the journal keeps it; nuisance slopes are computed again."""
-    return {
-        "causes": list(estimate.hypothesis.labels),
-        "vector": estimate.vector.tolist(),
-        "local": estimate.run_values.tolist(),
-        "chi_square": estimate.chi_square,
-        "converged": estimate.converged,
-        "laws": [[o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws],
-    }
 
 
 class FittingProblem:
@@ -302,7 +287,8 @@ class FittingProblem:
             noise_weighted(self.plant, r, output).reshape(-1, len(estimates))
             for r, output in zip(runs, outputs, strict=True)
         ]
-        return [np.where(np.abs(y) < UNSTABLE, y, np.nan) for y in weighted]
+        # What is larger comes from an unstable simulation: it counts as failed.
+        return [np.where(np.abs(y) < 1e9, y, np.nan) for y in weighted]
 
     def residuals(self, estimates: Sequence[Estimate], runs: Sequence[int]) -> list[NDArray]:
         """Weighted measured - model of n estimates, per run (values, n) [noise deviations]."""
@@ -310,4 +296,5 @@ class FittingProblem:
 
     def residual(self, run: int, outputs: NDArray) -> NDArray:
         """Measured less weighted outputs (values, n) of a run [noise deviations]."""
-        return np.nan_to_num(self.measured[run][:, None] - outputs, nan=FAILED_RESIDUAL)
+        # A candidate that cannot be simulated is far worse than every usable one: the fit moves away.
+        return np.nan_to_num(self.measured[run][:, None] - outputs, nan=1e3)

@@ -21,15 +21,8 @@ from identification.gap.prepare.noise import residual_noise
 FLOOR = 1.0
 """Gap that noise alone leaves [noise deviations]; a definition."""
 
-SHARE_STEPS = 1000
-"""Steps between 0 and 1 in which the interval of a share is searched."""
-
 WHOLE = "the_whole_recording"
 """The one regime of a plant that tells none apart."""
-
-REGIME_BLOCK, REGIME_BLOCK_SHARE = 4.0, 0.05
-"""Longest part of a regime that the bootstrap draws as one [time scales], longer than residuals
-correlate; relative to the shortest run [1] where that is less."""
 
 FEWEST_PARTS = 5
 """Fewest parts of a regime. With fewer on held-out runs all runs count; with fewer on all runs the gap
@@ -112,7 +105,7 @@ class GapDraws:
         )
 
     def _share_closed(self, base: str, label: str) -> Interval:
-        grid = np.linspace(0.0, 1.0, SHARE_STEPS + 1)
+        grid = np.linspace(0.0, 1.0, 1001)
         whole, closed = self.overall(base) - FLOOR, self.overall(base) - self.overall(label)
         value = float(np.clip(closed[0] / whole[0], 0, 1)) if whole[0] > 0 else 0.0
         below = np.mean(closed[1:, None] < grid * whole[1:, None], axis=0)
@@ -179,7 +172,7 @@ def regime_gaps(
         scale: the plant's time scale [s].
     """
     shortest = min(float(run.time[-1]) for run in plant.runs)
-    block = min(REGIME_BLOCK * scale, REGIME_BLOCK_SHARE * shortest)
+    block = min(4.0 * scale, 0.05 * shortest)  # longer than residuals correlate
     gaps = []
     for regime in masks[0]:
         own = [mask[regime] for mask in masks]
@@ -187,18 +180,25 @@ def regime_gaps(
         parts = squares.shape[1]
         weights = block_weights([parts], seed) if parts >= FEWEST_PARTS else None
         for channel, square, count in zip(plant.channels, squares, counts, strict=True):
-            if np.any(count):
-                gap, low, high = _gap_and_interval(square, count, weights)
-                gaps.append(
-                    RegimeGap(
-                        channel=channel.name,
-                        regime=regime,
-                        gap=gap,
-                        low=low,
-                        high=high,
-                        held_out=held_out,
-                    )
+            if not np.any(count):
+                continue
+            if weights is None:
+                gap = Interval(
+                    value=float(np.sqrt(np.sum(square) / np.sum(count))), low=0.0, high=np.inf
                 )
+            else:
+                least = np.finfo(float).tiny
+                gap = interval(np.sqrt((weights @ square) / np.maximum(weights @ count, least)))
+            gaps.append(
+                RegimeGap(
+                    channel=channel.name,
+                    regime=regime,
+                    gap=gap.value,
+                    low=gap.low,
+                    high=gap.high,
+                    held_out=held_out,
+                )
+            )
     return gaps
 
 
@@ -237,15 +237,3 @@ def _part_sums(
         np.add.reduceat(residual[:, inside] ** 2, first, axis=1),
         np.add.reduceat(run.trusted[:, inside].astype(float), first, axis=1),
     )
-
-
-def _gap_and_interval(
-    squares: NDArray, counts: NDArray, weights: NDArray | None
-) -> tuple[float, float, float]:
-    """Root mean square and its interval from sums over parts (parts,); weights: None for too few."""
-    if weights is None:
-        return float(np.sqrt(np.sum(squares) / np.sum(counts))), 0.0, np.inf
-    least = np.finfo(float).tiny
-    rms = np.sqrt((weights @ squares) / np.maximum(weights @ counts, least))
-    gap = interval(rms)
-    return gap.value, gap.low, gap.high

@@ -18,52 +18,9 @@ from identification.gap.fit.variable_projection import (
 )
 from identification.gap.plant import noise_weighted
 
-DIFFERENCE_STEP = 1e-3
-"""Relative change of a scaled parameter for a finite difference [1]: large against rounding of the
-simulation, small against the curvature of the outputs."""
-
-SMALLEST_DIFFERENCED = 0.1
-"""Scaled parameter [1] below which the difference step no longer shrinks with the parameter: a cause
-that does not act yet has the value 0."""
-
-PRIOR_STEP = 0.02
-"""Finite difference of a parameter with a Gaussian prior [standard deviations]: such a law changes a
-strength by a percent."""
-
-ITERATIONS, THOROUGH_ITERATIONS = 12, 40
-"""Most Gauss-Newton iterations, for computing time. A fit that needs more is weighed as it is and
-reported as not converged. Plants with a small catalogue have thorough fits, which cost little."""
-
-INITIAL_DAMPING = 0.1
-"""Levenberg-Marquardt damping of the first step, relative to the diagonal [1]: nearly none, as starts
-are expected to be close."""
-
-DAMPING_DECREASE, DAMPING_INCREASE = 0.2, 10.0
-"""Factors on the damping after a step that did and one that did not decrease chi-square [1] (Marquardt
-1963)."""
-
-LEAST_DAMPING, MOST_DAMPING = 1e-9, 1e6
-"""Bounds of the damping, relative to the diagonal [1]. The lower one is practically none; a fit ends at
-a tenth of the upper one, where a step is too short to gain anything."""
-
-CONVERGED_DECREASE = 0.3
-"""Predicted decrease of chi-square [1] below which a fit has converged: less changes no odds."""
-
-CONVERGED_EXCESS_SHARE, THOROUGH_EXCESS_SHARE = 3e-3, 1e-4
-"""Predicted decrease below which a fit, or a thorough one, has converged, as a share of the excess,
-chi-square beyond one per reading [1]: a cause that leaves a large residual need not be fitted to the
-last digit. A thorough fit follows a flat valley to its end."""
-
-PROMISED_DECREASES = 3.0
-"""Multiple of the predicted decrease [1] that a fit may still gain, before it is given up: steps of a
-nonlinear model gain more than they predict at first."""
-
-HOPELESS_EXCESS_RATIO = 3.0
-"""A fit is given up if its excess stays above this multiple of its best rival's excess [1], for
-computing time."""
-
-HOPELESS_EXCESS_PER_READING = 0.05
-"""Excess per reading that the rule above adds [1]: noise is not known to the percent."""
+MOST_DAMPING = 1e6
+"""Greatest damping of Levenberg and Marquardt, relative to the diagonal [1]; a fit ends at a tenth of
+it, where a step is too short to gain anything."""
 
 
 def linearise(
@@ -107,9 +64,11 @@ def _kept(problem: FittingProblem, estimate: Estimate) -> int:
 def _steps(problem: FittingProblem, estimate: Estimate) -> NDArray:
     """Finite differences of the scaled vector (k,) [1], away from the nearer end of each range."""
     middle = np.array([0.5 * (p.low + p.high) / p.scale for p in problem.parameters(estimate)])
-    sizes = np.maximum(np.abs(estimate.vector), SMALLEST_DIFFERENCED)
+    sizes = np.maximum(np.abs(estimate.vector), 0.1)  # a cause that does not act yet has the value 0
     sd = np.array([p.sd / p.scale for p in problem.parameters(estimate)])
-    steps = np.where(np.isfinite(sd), PRIOR_STEP * sd, DIFFERENCE_STEP * sizes)
+    # Large against rounding of the simulation, small against the outputs' curvature; 0.02 standard
+    # deviations of a law change a strength by a percent.
+    steps = np.where(np.isfinite(sd), 0.02 * sd, 1e-3 * sizes)
     return np.where(estimate.vector > middle, -steps, steps)
 
 
@@ -214,7 +173,7 @@ def fit(
     problem: FittingProblem,
     starts: Sequence[Estimate],
     rival_chi_square: float = np.inf,
-    iterations: int = ITERATIONS,
+    iterations: int = 12,
 ) -> list[Estimate]:
     """Fit every start to the fitted runs, until each fit has converged or is given up.
 
@@ -222,13 +181,14 @@ def fit(
         problem: readings and settings.
         starts: where the fits begin.
         rival_chi_square: least chi-square of earlier fits against which these compete [1].
-        iterations: most of them, for fits that need not be thorough.
+        iterations: most of them, for computing time; a fit that needs more is weighed as it is and
+            reported as not converged. A thorough fit, of a small catalogue, has 40.
     """
     if not starts:
         return []
     searches = [_Search(problem, start) for start in starts]
     active = searches
-    for _ in range((THOROUGH_ITERATIONS if problem.thorough else iterations) + 1):
+    for _ in range((40 if problem.thorough else iterations) + 1):
         linearised = linearise(problem, [search.trial for search in active], problem.fitted_runs)
         for search, runs in zip(active, linearised, strict=True):
             search.advance(runs, rival_chi_square)
@@ -246,7 +206,7 @@ class _Search:
         self.problem = problem
         self.best = start
         self.trial = start
-        self.damping = INITIAL_DAMPING
+        self.damping = 0.1  # nearly none, as starts are expected to be close
         self.equations: NormalEquations | None = None
 
     def advance(self, runs: Sequence[LinearisedRun], rival_chi_square: float) -> None:
@@ -262,15 +222,14 @@ class _Search:
             self.trial, self.equations = self.best, None
             return
         else:
-            raised = DAMPING_INCREASE * self.damping + 1e-6  # leaves zero as well
-            self.damping = min(raised, MOST_DAMPING)
+            self.damping = min(10.0 * self.damping + 1e-6, MOST_DAMPING)  # Marquardt 1963
             current = self.equations
         step, decrease = current.step(*self.problem.ends(self.best), self.damping)
         self.trial = replace(self.best, vector=self.best.vector + step)
         self._decide(decrease, rival_chi_square)
 
     def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
-        self.damping = max(DAMPING_DECREASE * self.damping, LEAST_DAMPING)
+        self.damping = max(0.2 * self.damping, 1e-9)
         self.equations = equations
         # Run parameters of the causes take the step as well; run offsets stay linear.
         run_values = self.trial.run_values.copy()
@@ -280,17 +239,17 @@ class _Search:
         self.best = replace(self.trial, chi_square=equations.chi_square, run_values=run_values)
 
     def _decide(self, decrease: float, rival_chi_square: float) -> None:
-        """Mark the fit as converged or given up."""
+        """Mark the fit as converged, or as given up for computing time."""
         readings = self.problem.readings
-        share = THOROUGH_EXCESS_SHARE if self.problem.thorough else CONVERGED_EXCESS_SHARE
         excess = self.best.chi_square - readings
-        enough = max(CONVERGED_DECREASE, share * excess)
-        hopeless = (
-            HOPELESS_EXCESS_RATIO * max(rival_chi_square - readings, 0.0)
-            + HOPELESS_EXCESS_PER_READING * readings
-        )
+        # A decrease of 0.3 changes no odds, and a cause that leaves much need not be fitted to the last
+        # digit; a thorough fit follows a flat valley to its end.
+        enough = max(0.3, (1e-4 if self.problem.thorough else 3e-3) * excess)
+        # A rival is far better; noise is not known to the percent.
+        hopeless = 3.0 * max(rival_chi_square - readings, 0.0) + 0.05 * readings
         self.best = replace(
             self.best,
             converged=bool(decrease < enough or self.damping >= 0.1 * MOST_DAMPING),
-            given_up=bool(excess - PROMISED_DECREASES * decrease > hopeless),
+            # Steps of a nonlinear model gain more than they predict at first.
+            given_up=bool(excess - 3.0 * decrease > hopeless),
         )

@@ -16,10 +16,6 @@ from identification.gap.fit.variable_projection import (
 from identification.gap.plant import GreyBox, noise_weighted
 from identification.report_2003 import partial_error, relative_error, total_error
 
-SETTLING_STEPS = 3
-"""Gauss-Newton steps for a cause's run parameters when a run is predicted; the outputs are nearly linear
-in them, so that three suffice."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Prediction:
@@ -57,10 +53,11 @@ def predict(problem: FittingProblem, estimate: Estimate) -> Prediction:
 def with_settled_runs(problem: FittingProblem, estimate: Estimate) -> Estimate:
     """The estimate whose run parameters suit every run, held-out ones too, all else as it is.
 
-    The outputs need not be linear in them: a winding that begins 30 K warmer, for one.
+    The outputs need not be linear in them, as with a winding that begins 30 K warmer, but nearly so:
+    three Gauss-Newton steps suffice.
     """
     count = len(estimate.hypothesis.run_parameters)
-    for _ in range(SETTLING_STEPS if count else 0):
+    for _ in range(3 if count else 0):
         runs = _in_run_parameters(problem, estimate)[1]
         shared = _shared(problem, runs)
         steps = [without_run_nuisances(run, shared)[1][:count] for run in runs]
@@ -118,12 +115,12 @@ def percentage_errors(plant: GreyBox, outputs: Sequence[NDArray]) -> Mapping[str
         divides by its time mean, which then says nothing of its size.
     """
     held_out = [(run, y) for run, y in zip(plant.runs, outputs, strict=True) if run.held_out]
-    if not all(
-        _keeps_sign(readings, channel.noise)
-        for run, _ in held_out
-        for channel, readings in zip(plant.channels, run.measured, strict=True)
-    ):
-        return None
+    for run, _ in held_out:
+        for channel, readings in zip(plant.channels, run.measured, strict=True):
+            # All on one side of 0, and their mean off 0, but for noise.
+            up, down = np.mean(np.maximum(readings, 0.0)), np.mean(np.maximum(-readings, 0.0))
+            if not min(up, down) <= (channel.noise or 0.0) < abs(up - down):
+                return None
     errors = np.array(
         [
             [
@@ -138,9 +135,3 @@ def percentage_errors(plant: GreyBox, outputs: Sequence[NDArray]) -> Mapping[str
     }
     overall = total_error([partial_error(list(run)) for run in errors])
     return {name: 100 * error for name, error in {**by_channel, "overall": float(overall)}.items()}
-
-
-def _keeps_sign(measured: NDArray, noise: float | None) -> bool:
-    """Whether readings (samples,) [SI] lie on one side of 0, and their mean off 0, but for noise."""
-    positive, negative = np.mean(np.maximum(measured, 0.0)), np.mean(np.maximum(-measured, 0.0))
-    return bool(min(positive, negative) <= (noise or 0.0) < abs(positive - negative))

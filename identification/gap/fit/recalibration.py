@@ -18,16 +18,9 @@ from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio
 from identification.gap.prepare.prepared_plant import PreparedPlant, prepared
 from identification.readings_noise import white_noise
 
-FURTHER_ITERATIONS = 12
-"""Most steps of a fit that goes on with nuisance slopes of its own."""
-
 WRONG_NOISE_RATIO = 1.25
 """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
 noise is corrected [1]: less changes no judgement."""
-
-FORESEEN_SHARE = 0.2
-"""Share of the held-out squares that a black box may foresee of a ripple, by chance: its readings are
-correlated [1]."""
 
 
 def recalibrate(
@@ -69,7 +62,7 @@ def with_own_nuisances(
         replace(restarted(each.estimate), slopes=own)
         for each, own in zip(evaluated, slopes, strict=True)
     ]
-    fitted = cache(name, lambda: fit(problem, starts, iterations=FURTHER_ITERATIONS))
+    fitted = cache(name, lambda: fit(problem, starts))
     # A journal keeps no slopes.
     return evaluate(problem, [replace(e, slopes=own) for e, own in zip(fitted, slopes, strict=True)])
 
@@ -98,8 +91,8 @@ def with_ripple(
     noise: by channel under the best hypothesis. foreseen: share of its held-out squares that a black box
     predicts, by channel [1]; what a model of the inputs foresees is a misfit, no ripple.
     """
+    # By chance a fifth of correlated readings may be foreseen.
     ripples = tuple(
-        own.ripple if share < FORESEEN_SHARE else None
-        for own, share in zip(noise, foreseen, strict=True)
+        own.ripple if share < 0.2 else None for own, share in zip(noise, foreseen, strict=True)
     )
     return plant.with_ripples(ripples) if any(ripples) else plant

@@ -12,15 +12,8 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-PIVOTS = 100
-"""Most exchanges of the numbers at their bounds; few problems need more than five."""
-
-TRIES = 3
-"""Exchanges of all numbers at once that need not help before they are exchanged one by one."""
-
-RIDGE, ROUNDING = 1e-12, 1e-10
-"""Added to the diagonal of a scaled matrix [1], as columns may be equal; and the relative excess of a
-bound, and slope at a bound, that is rounding."""
+ROUNDING = 1e-10
+"""Relative excess of a bound, and slope at a bound, that is rounding [1]."""
 
 
 def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
@@ -31,7 +24,7 @@ def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDAr
     if not len(moment):
         return np.zeros(0)
     scale = 1.0 / np.sqrt(np.diag(matrix))
-    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(scale))
+    scaled = matrix * np.outer(scale, scale) + 1e-12 * np.eye(len(scale))  # columns may be equal
     return np.clip(_pivoted(scaled, moment * scale, low / scale, high / scale) * scale, low, high)
 
 
@@ -39,11 +32,12 @@ def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDAr
 def _pivoted(matrix, moment, low, high):
     """The minimiser (n,): numbers beyond a bound go there, those that push inwards leave it.
 
-    Where exchanging all of them together does not help, the last one alone is exchanged, which ends.
+    Where exchanging all of them together has not helped three times, the last one alone is exchanged,
+    which ends; few problems need more than five exchanges.
     """
     place = np.where(high <= low, -1, 0)  # -1: at the lower bound, 1: at the upper one, 0: between
-    x, fewest, tries = np.zeros(len(moment)), len(moment) + 1, TRIES
-    for _ in range(PIVOTS):
+    x, fewest, tries = np.zeros(len(moment)), len(moment) + 1, 3
+    for _ in range(100):
         free = np.flatnonzero(place == 0)
         x = np.where(place < 0, low, np.where(place > 0, high, 0.0))
         if len(free):
@@ -53,7 +47,7 @@ def _pivoted(matrix, moment, low, high):
         wrong = np.flatnonzero(target != place)
         if not len(wrong):
             break
-        tries = TRIES if len(wrong) < fewest else tries - 1
+        tries = 3 if len(wrong) < fewest else tries - 1
         fewest = min(fewest, len(wrong))
         if tries < 0:
             wrong = wrong[-1:]
@@ -296,17 +290,6 @@ def without_run_nuisances(run: LinearisedRun, shared: NDArray) -> tuple[NDArray,
     return residual - run.run_slopes @ step, step
 
 
-def shared_as_slopes(run: LinearisedRun) -> LinearisedRun:
-    """The run with its shared nuisances appended to the parameters, (values, k + m), and none left."""
-    return replace(
-        run,
-        slopes=np.column_stack([run.slopes, run.shared_slopes]),
-        slope_precision=np.append(run.slope_precision, np.ones(run.shared_slopes.shape[1])),
-        slope_values=np.append(run.slope_values, np.zeros(run.shared_slopes.shape[1])),
-        shared_slopes=np.zeros((len(run.residual), 0)),
-    )
-
-
 def _shifted(grams: NDArray, first: int, amounts: NDArray) -> NDArray:
     """Gram matrices after the columns from `first` on times `amounts` leave the residual in row 0.
 
@@ -338,19 +321,16 @@ def _with_priors(grams: NDArray, runs: Sequence[LinearisedRun]) -> RunProducts:
     grams = _shifted(grams, first, -values)
     nuisances = np.arange(first, grams.shape[1])
     grams[:, nuisances, nuisances] += 1.0 / sd**2
-    prior = _prior(runs[0], first)
-    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd, prior=prior)
-
-
-def _prior(run: LinearisedRun, count: int) -> NDArray:
-    """`RunProducts.prior` of `count` columns: residual, slopes, slopes added to them, shared ones."""
-    prior, k, m = np.zeros((count, count)), len(run.slope_precision), run.shared_slopes.shape[1]
+    # Of residual, slopes, slopes that were added to them, and shared nuisances.
+    prior, run = np.zeros((first, first)), runs[0]
+    slopes = np.arange(1, 1 + len(run.slope_precision))
+    shared = np.arange(first - run.shared_slopes.shape[1], first)
     moment = run.slope_precision * run.slope_values
     prior[0, 0] = moment @ run.slope_values
-    prior[0, 1 : 1 + k] = prior[1 : 1 + k, 0] = -moment
-    prior[np.arange(1, 1 + k), np.arange(1, 1 + k)] = run.slope_precision
-    prior[np.arange(count - m, count), np.arange(count - m, count)] = 1.0
-    return prior
+    prior[0, slopes] = prior[slopes, 0] = -moment
+    prior[slopes, slopes] = run.slope_precision
+    prior[shared, shared] = 1.0
+    return RunProducts(grams=grams, bounds=LARGEST_DEVIATION * sd, prior=prior)
 
 
 class ChangedRuns:

@@ -9,7 +9,6 @@ with grouped folds would solve each of them anew and choose one penalty for all 
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,55 +16,20 @@ from numpy.typing import NDArray
 from identification.gap.fit.prediction import Prediction
 from identification.gap.plant import GreyBox
 
-HISTORY_UNIT = 0.1
-"""Unit of the lags below [time scales], or the sampling period if that is longer: a transient has about
-ten."""
-
 HISTORY_LAGS = (1, 2, 4, 10, 20, 40, 100, 400)
 """Lags at which the black box sees inputs and outputs [history units]: 0.1 to 4 time scales for
 transients, to 40 for what they leave."""
-
-FEWEST_LEARNING_SAMPLES = 2000
-"""Samples of all learning runs together that a stride of the history unit must leave; fewer have a
-shorter stride: one sample tells little through its noise."""
-
-RANDOM_FEATURES = 300
-"""Number of random Fourier features; computing time."""
-
-SHORTEST_WAVE, LONGEST_WAVE = 0.2, 3.0
-"""Lengths of a random feature, in typical distances of two samples [1]."""
-
-FEATURE_LIMIT = 10.0
-"""Bound of a standardised feature [standard deviations], for samples unlike all others."""
 
 PENALTIES = np.logspace(-3.0, 5.0, 9)
 """Ridge penalties [1]: from none to no prediction, one per decade."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class LearningRun:
-    """A run from which the black box learns."""
-
-    features: NDArray
-    """(samples, features) [SI]."""
-    target: NDArray
-    """The residual, (channels, samples) [noise deviations]; 0 at untrusted readings."""
-
-
-Learner = Callable[[Sequence[LearningRun], Sequence[NDArray], int], list[NDArray]]
-"""A black box: (learning runs, features of the runs to predict, seed) to predictions, per run (channels,
-samples) [noise deviations]."""
-
-
-def predict_residuals(
-    plant: GreyBox, model: Prediction, learner: Learner, seed: int, scale: float
-) -> list[NDArray]:
+def predict_residuals(plant: GreyBox, model: Prediction, seed: int, scale: float) -> list[NDArray]:
     """A model's residuals of the held-out runs as the black box predicts them.
 
     Args:
         plant: the plant with its recordings.
         model: outputs and residuals of the model.
-        learner: the black box.
         seed: of its random features.
         scale: the plant's time scale [s].
 
@@ -74,15 +38,14 @@ def predict_residuals(
     """
     features = [history_features(plant, r, y, scale) for r, y in enumerate(model.outputs)]
     fitted = [r for r, run in enumerate(plant.runs) if not run.held_out]
-    samples = sum(len(features[r]) for r in fitted)
-    longest = max(1, samples // FEWEST_LEARNING_SAMPLES)
+    # One sample tells little through its noise: a stride must leave 2000 of all runs.
+    longest = max(1, sum(len(features[r]) for r in fitted) // 2000)
     strides = {r: min(longest, history_stride(plant, r, scale)) for r in fitted}
     learning = [
-        LearningRun(features=features[r][::stride], target=model.residuals[r][:, ::stride])
-        for r, stride in strides.items()
+        (features[r][::stride], model.residuals[r][:, ::stride].T) for r, stride in strides.items()
     ]
     held_out = [features[r] for r, run in enumerate(plant.runs) if run.held_out]
-    predictions = iter(learner(learning, held_out, seed))
+    predictions = iter(ridge_on_random_features(learning, held_out, seed))
     return [
         next(predictions) * run.trusted if run.held_out else np.zeros(run.measured.shape)
         for run in plant.runs
@@ -90,12 +53,13 @@ def predict_residuals(
 
 
 def ridge_on_random_features(
-    learning: Sequence[LearningRun], features: Sequence[NDArray], seed: int
+    learning: Sequence[tuple[NDArray, NDArray]], features: Sequence[NDArray], seed: int
 ) -> list[NDArray]:
     """Ridge regression with the penalty that predicts left-out runs best.
 
     Args:
-        learning: runs to learn from.
+        learning: of each run to learn from, features (samples, features) [SI], and the residual
+            (samples, channels) [noise deviations], 0 at untrusted readings. A single run is cut in two.
         features: of the runs to predict, (samples, features) each [SI].
         seed: of the random features.
 
@@ -103,9 +67,13 @@ def ridge_on_random_features(
         Per run (channels, samples) [noise deviations]; zero where leaving runs out shows nothing that
         carries over.
     """
-    waves = random_fourier_features(np.concatenate([run.features for run in learning]), seed)
-    folds = [(waves(run.features), run.target.T) for run in _folds(learning)]
-    linear = learning[0].features.shape[1]
+    waves = random_fourier_features(np.concatenate([values for values, _ in learning]), seed)
+    if len(learning) == 1:
+        ((values, target),) = learning
+        middle = len(values) // 2
+        learning = [(values[:middle], target[:middle]), (values[middle:], target[middle:])]
+    folds = [(waves(values), target) for values, target in learning]
+    linear = learning[0][0].shape[1]
     grams = np.array([z.T @ z for z, _ in folds])
     moments = np.array([z.T @ y for z, y in folds])
     left = 0.0
@@ -116,17 +84,6 @@ def ridge_on_random_features(
     best = np.argmin(left, axis=0)
     weights = np.take_along_axis(solutions, best[None, None], axis=1)[:, 0]
     return [(waves(values) @ weights).T for values in features]
-
-
-def _folds(learning: Sequence[LearningRun]) -> list[LearningRun]:
-    """Runs to leave out in turn; a single one is cut in two."""
-    if len(learning) > 1:
-        return list(learning)
-    run, middle = learning[0], len(learning[0].features) // 2
-    return [
-        LearningRun(features=run.features[part], target=run.target[:, part])
-        for part in (slice(None, middle), slice(middle, None))
-    ]
 
 
 def _solutions(gram: NDArray, moment: NDArray, linear: int) -> NDArray:
@@ -167,8 +124,11 @@ def history_features(plant: GreyBox, run: int, outputs: NDArray, scale: float) -
 
 
 def history_stride(plant: GreyBox, run: int, scale: float) -> int:
-    """Number of samples in the history unit, at least one; scale: the plant's time scale [s]."""
-    return max(1, round(HISTORY_UNIT * scale / plant.runs[run].time[1]))
+    """Number of samples in the history unit, at least one; scale: the plant's time scale [s].
+
+    The unit is a tenth of the time scale: a transient has about ten.
+    """
+    return max(1, round(0.1 * scale / plant.runs[run].time[1]))
 
 
 def random_fourier_features(features: NDArray, seed: int) -> Callable[[NDArray], NDArray]:
@@ -187,14 +147,14 @@ def random_fourier_features(features: NDArray, seed: int) -> Callable[[NDArray],
     mean, sd = np.mean(features, axis=0), np.std(features, axis=0)
     scale = np.where(sd > 0, 1.0 / np.where(sd > 0, sd, 1.0), 0.0)
     rng = np.random.default_rng(seed)
-    count, waves, limit = features.shape[1], RANDOM_FEATURES, FEATURE_LIMIT
-    low, high = np.log((SHORTEST_WAVE, LONGEST_WAVE))
+    count, waves = features.shape[1], 300
+    low, high = np.log((0.2, 3.0))  # in typical distances of two samples
     lengths = np.exp(rng.uniform(low, high, waves)) * np.sqrt(2 * count)
     frequencies = rng.standard_normal((count, waves)) / lengths
     phases = rng.uniform(0, 2 * np.pi, waves)
 
     def mapped(values: NDArray) -> NDArray:
-        standard = np.clip((values - mean) * scale, -limit, limit)
+        standard = np.clip((values - mean) * scale, -10.0, 10.0)  # for samples unlike all others
         return np.column_stack([standard, np.sqrt(2) * np.cos(standard @ frequencies + phases)])
 
     return mapped

@@ -14,21 +14,23 @@ from numpy.typing import NDArray
 from identification.block_bootstrap import Interval, block_starts
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import FLOOR, Gap, GapDraws, block_samples
-from identification.gap.fit.prediction import Prediction, percentage_errors, predict
-from identification.gap.judge.black_box import Learner, predict_residuals, ridge_on_random_features
+from identification.gap.fit.prediction import percentage_errors, predict
+from identification.gap.judge.black_box import predict_residuals
 from identification.gap.plant import GreyBox
 from identification.gap.prepare.time_scale import time_scale
 
 NOMINAL, RECALIBRATED = "nominal", "recalibrated"
 """Labels of the two models without a cause."""
 
+BOXED, NOMINAL_OFFSETS = " + black box", ", nominal run offsets"
+"""Ends of the labels of a model with the black box on top, and with nominal run offsets."""
+
 PERMUTATIONS, SIGNIFICANCE = 1999, 0.01
 """Random orders of blocks behind a p-value, which is then at least 0.0005, and the p-value below which a
 prediction is not chance."""
 
-LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED = 0.02, 0.05
-"""Gap that a prediction must close to matter [noise deviations], and share of the explainable gap [1];
-the larger of both holds."""
+LEAST_GAP_CLOSED = 0.02
+"""Gap that a prediction must close to matter [noise deviations]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -71,7 +73,6 @@ class DiscrepancyReduction:
 def measure_discrepancy_reduction(
     problem: FittingProblem,
     estimates: Mapping[str, Estimate],
-    learner: Learner = ridge_on_random_features,
     seed: int = 0,
 ) -> DiscrepancyReduction:
     """Judge fitted models on the held-out runs.
@@ -79,7 +80,6 @@ def measure_discrepancy_reduction(
     Args:
         problem: the plant with its readings.
         estimates: 'nominal', 'recalibrated' and the causes by label, the best cause first.
-        learner: the black box.
         seed: of the bootstrap, the random features and the permutations.
 
     Raises:
@@ -94,13 +94,18 @@ def measure_discrepancy_reduction(
     scale = time_scale(plant)
     boxes = {}
     for label in {RECALIBRATED, best}:
-        box = predict_residuals(plant, predictions[label], learner, seed, scale)
+        box = predict_residuals(plant, predictions[label], seed, scale)
         before, after = _held_out_squares(plant, predictions[label].residuals, box)
         # A box that makes the held-out residuals larger predicts nothing.
         boxes[label] = box if after.sum() < before.sum() else [np.zeros_like(block) for block in box]
-    draws = GapDraws(plant, _all_residuals(predictions, boxes), seed, scale)
+    residuals = {label: model.residuals for label, model in predictions.items()}
+    for label, box in boxes.items():
+        residuals[label + BOXED] = [y - p for y, p in zip(residuals[label], box, strict=True)]
+    for label, model in predictions.items():
+        residuals[label + NOMINAL_OFFSETS] = model.residuals_nominal_offsets
+    draws = GapDraws(plant, residuals, seed, scale)
     unexplained = {
-        label: _unexplained(draws, label, p_value(plant, predictions[label].residuals, box, seed, scale))
+        label: _unexplained(draws, label, p_value(plant, residuals[label], box, seed, scale))
         for label, box in boxes.items()
     }
     ratios = zip(plant.channels, draws.noise, strict=True)
@@ -111,11 +116,11 @@ def measure_discrepancy_reduction(
         },
         shares_closed={
             label: draws.share_closed(
-                RECALIBRATED, label, (_nominal_offsets(RECALIBRATED), _nominal_offsets(label))
+                RECALIBRATED, label, (RECALIBRATED + NOMINAL_OFFSETS, label + NOMINAL_OFFSETS)
             )
             for label in causes
         },
-        black_box=draws.gap(_boxed(RECALIBRATED)),
+        black_box=draws.gap(RECALIBRATED + BOXED),
         black_box_helps=any(np.any(block) for block in boxes[RECALIBRATED]),
         unexplained=unexplained[best],
         recalibration_leaves=unexplained[RECALIBRATED],
@@ -126,7 +131,7 @@ def measure_discrepancy_reduction(
 def predictable_shares(problem: FittingProblem, estimate: Estimate) -> list[float]:
     """Share of a model's held-out squares that a black box foresees, by channel [1]."""
     plant, model = problem.plant, predict(problem, estimate)
-    box = predict_residuals(plant, model, ridge_on_random_features, 0, time_scale(plant))
+    box = predict_residuals(plant, model, 0, time_scale(plant))
     before, after = _held_out_squares(plant, model.residuals, box)
     return list(1.0 - after / np.maximum(before, np.finfo(float).tiny))
 
@@ -144,42 +149,15 @@ def _held_out_squares(
     return before, after
 
 
-def _all_residuals(
-    predictions: Mapping[str, Prediction], boxes: Mapping[str, list[NDArray]]
-) -> dict[str, list[NDArray]]:
-    """Residuals of the models, with the black box on top, and with nominal run offsets, by label.
-
-    boxes: residuals that the black box predicts, per run (channels, samples) [noise deviations].
-    """
-    residuals = {label: prediction.residuals for label, prediction in predictions.items()}
-    boxed = {
-        _boxed(label): [y - p for y, p in zip(residuals[label], box, strict=True)]
-        for label, box in boxes.items()
-    }
-    nominal_offsets = {
-        _nominal_offsets(label): prediction.residuals_nominal_offsets
-        for label, prediction in predictions.items()
-    }
-    return {**residuals, **boxed, **nominal_offsets}
-
-
-def _boxed(label: str) -> str:
-    return f"{label} + black box"
-
-
-def _nominal_offsets(label: str) -> str:
-    return f"{label}, nominal run offsets"
-
-
 def _unexplained(draws: GapDraws, best: str, significance: float) -> Unexplained:
     """What a model leaves above the floor, and what the black box finds in it.
 
     significance: p-value of the black box's prediction.
     """
     recalibrated = draws.gap(RECALIBRATED).overall
-    left, boxed = draws.overall(best)[0], draws.overall(_boxed(best))[0]
+    left, boxed = draws.overall(best)[0], draws.overall(best + BOXED)[0]
     explainable = max(recalibrated.value - FLOOR, 0.0)
-    matters = max(LEAST_GAP_CLOSED, LEAST_SHARE_CLOSED * explainable)
+    matters = max(LEAST_GAP_CLOSED, 0.05 * explainable)
     return Unexplained(
         fraction=float(np.clip((left - FLOOR) / explainable, 0.0, 1.0))
         if min(recalibrated.low, recalibrated.value) > FLOOR

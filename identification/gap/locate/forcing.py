@@ -27,26 +27,9 @@ WINDOWS, MOST_WINDOWS = 80, 400
 """Windows of a run in which a forcing is constant, where they follow its motion, and the most of them
 elsewhere; where those are too few, only the first part of the run counts. Computing time."""
 
-LONGEST_WINDOW, RESOLVED_WINDOW = 1.5, 0.5
-"""Length of a window, half of the motion lying in shorter ones, up to which windows follow the motion,
-and where more are needed [time scales]: a third and a tenth of a period."""
-
 WINDOWS_TOGETHER, MOST_VALUES = 1200, 8_000_000
 """Most windows of all runs, and most changes of a run's readings by its windows (64 MB), where they are
 more than usual: time and memory for matrices of this size."""
-
-UNIFORM_SHARE = 0.3
-"""Share of the windows spread uniformly in time [1]; the others follow the states' motion."""
-
-SAMPLES = 8000
-"""Most samples of the runs that are examined together, for time and memory; one run at least."""
-
-LATE_READINGS = 0.1
-"""Share of a run before its first reading that counts [1], beyond which the run is examined only where
-there is no other."""
-
-REGULARISATION = 1e-9
-"""Precision added to parameters that no reading determines [1], against a singular matrix."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,7 +113,7 @@ class NuisanceElimination:
             chi_square += float(residual @ residual + precision @ run.run_values**2)
         tolerances = np.arange(k, shared)
         self._hessian[tolerances, tolerances] += 1.0
-        self._hessian[np.diag_indices_from(self._hessian)] += REGULARISATION
+        self._hessian[np.diag_indices_from(self._hessian)] += 1e-9  # no reading may tell of some
         explained = self._gradient @ np.linalg.solve(self._hessian, self._gradient)
         self.chi_square = float(chi_square - explained)
         """Sum of squares of the residual after the elimination [1]."""
@@ -256,7 +239,7 @@ def _fault_forms(
 
 
 def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) -> list[int]:
-    """Indices of the runs with the largest mean square residual, up to a number of samples together.
+    """Indices of the runs with the largest mean square residual: one, or up to 8000 samples together.
 
     A run whose readings count late only is taken where there is no other: what the model lacked before
     them shows in them, too, but not where it acted.
@@ -267,11 +250,11 @@ def most_misfitting_runs(problem: FittingProblem, residuals: Sequence[NDArray]) 
     lengths = np.array([len(run.time) for run in runs])
     misfit = np.array([np.sum(residual**2) for residual in residuals]) / lengths
     begins = np.array([np.argmax(np.any(run.trusted, axis=0)) for run in runs]) / lengths
-    late = begins > LATE_READINGS
+    late = begins > 0.1
     if not np.all(late):
         misfit = np.where(late, -1.0, misfit)
     first, *others = [run for run in np.argsort(-misfit, kind="stable").tolist() if misfit[run] >= 0]
-    chosen, left = [first], SAMPLES - lengths[first]
+    chosen, left = [first], 8000 - lengths[first]
     for run in others:
         if lengths[run] <= left and len(chosen) < WINDOWS_TOGETHER // WINDOWS:
             chosen.append(run)
@@ -296,9 +279,10 @@ def resolving_edges(
     """
     edges = window_edges(time, traces, WINDOWS)
     typical = _typical_length(edges, traces) * (time[1] - time[0]) / scale
-    if typical <= LONGEST_WINDOW:
+    # A third of a period still follows the motion; where it does not, a tenth is needed.
+    if typical <= 1.5:
         return edges
-    needed = int(np.ceil(WINDOWS * typical / RESOLVED_WINDOW))
+    needed = int(np.ceil(WINDOWS * typical / 0.5))
     if needed > most:
         part = slice(first, first + max(WINDOWS, int(len(time) * most / needed)))
         traces = {name: replace(trace, values=trace.values[part]) for name, trace in traces.items()}
@@ -322,7 +306,7 @@ def window_edges(time: NDArray, traces: Mapping[str, StateTrace], windows: int) 
     """
     uniform = np.full(len(time) - 1, 1.0 / (len(time) - 1))
     motion = np.mean([*_motion(traces), uniform], axis=0)
-    density = UNIFORM_SHARE * uniform + (1 - UNIFORM_SHARE) * motion
+    density = 0.3 * uniform + 0.7 * motion  # most follow the states
     progress = np.concatenate([[0.0], np.cumsum(density)]) / np.sum(density)
     ends = np.searchsorted(progress, np.linspace(0.0, 1.0, windows + 1)[1:-1])
     return np.unique([0, *ends, len(time) - 1])

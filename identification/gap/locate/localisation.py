@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import logsumexp
+from scipy.special import logsumexp, softmax
 
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import RegimeGap, regime_gaps, regimes_of
@@ -28,31 +28,11 @@ from identification.gap.prepare.time_scale import time_scale
 FREE, SLOW = "free", "slow"
 """Processes in time: independent windows, or neighbours alike. Other processes bear a state's name."""
 
-AMPLITUDES = np.logspace(-3.0, 9.0, 37)
-"""Variances of a forcing over which the evidence is averaged, relative to what the readings tell of it
-on average [1]: from no effect to far beyond any gap, three per decade."""
-
-STATE_LENGTH, TIME_MEMORY = 0.2, 0.02
-"""Correlation length of a function of a state, relative to the state's range: the smooth terms of
-physics bend once or twice. Correlation time of a slow forcing, relative to the longest run [1]."""
-
 ROUGH_VARIANCE = 1e-3
 """Variance by which single windows may depart from a smooth forcing, relative to the whole [1]."""
 
-IDENTIFIABLE_SHARE = 1e-7
-"""Precision of a direction of forcings, relative to the most precise one [1], below which the direction
-is left out: rounding is no information."""
-
-RIVAL_SHARE = 0.5
-"""Share of what the best equation explains [1], below which functions of states are not tried."""
-
-PRIOR_NOTHING, PRIOR_READING = 0.9, 0.3
-"""Probability before any data that nothing is missing: only clear evidence names an equation. That of a
-fault of the readings relative to an equation: sensors are checked more often than physics."""
-
-EVIDENCE_DOUBT = 0.5
-"""Log evidences are divided by this number times the root of the largest one [1], since the assumed
-forms of a forcing are not exact."""
+PRIOR_NOTHING = 0.9
+"""Probability before any data that nothing is missing: only clear evidence names an equation."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -152,7 +132,8 @@ class IdentifiableSubspace:
     def __init__(self, form: QuadraticForm):
         """Keep the directions that are precise enough."""
         precision, axes = np.linalg.eigh(form.precision)
-        kept = precision > IDENTIFIABLE_SHARE * max(precision[-1], np.finfo(float).tiny)
+        # What is less precise is rounding, and no information.
+        kept = precision > 1e-7 * max(precision[-1], np.finfo(float).tiny)
         self.form = form
         self.root = axes[:, kept] * np.sqrt(precision[kept])
         """Square root of the precision, precision = root root', (windows, d)."""
@@ -178,8 +159,10 @@ def locate(
     scale = time_scale(plant)
     design, forms = quadratic_forms(problem, estimate, runs, scale)
     fits = fit_processes(forms, design)
-    evidence = np.array([average_log_evidence(own) for own in fits])
-    priors = [1.0 if form.windows else PRIOR_READING for form in forms]
+    # The processes of an equation are equally likely before the data.
+    evidence = np.array([logsumexp([f.log_evidence for f in own]) - np.log(len(own)) for own in fits])
+    # Sensors are checked more often than physics.
+    priors = [1.0 if form.windows else 0.3 for form in forms]
     weights = _probabilities(evidence, priors)
     order = np.argsort(-evidence, kind="stable")
     likeliest = fits[int(np.argmax(weights[:-1]))]
@@ -201,11 +184,9 @@ def _probabilities(evidence: NDArray, priors: Sequence[float]) -> NDArray:
     evidence: log evidence of each place, (places,). priors: relative probability before any data.
     """
     largest = max(float(np.max(evidence)), 0.0)
-    doubt = max(1.0, EVIDENCE_DOUBT * np.sqrt(largest))
+    doubt = max(1.0, 0.5 * np.sqrt(largest))  # the assumed forms of a forcing are not exact
     prior = (1 - PRIOR_NOTHING) * np.array(priors) / np.sum(priors)
-    score = np.append(evidence / doubt + np.log(prior), np.log(PRIOR_NOTHING))
-    weights = np.exp(score - np.max(score))
-    return weights / np.sum(weights)
+    return softmax(np.append(evidence / doubt + np.log(prior), np.log(PRIOR_NOTHING)))
 
 
 def _channel_gaps(problem: FittingProblem, residuals: Sequence[NDArray]) -> dict[str, float]:
@@ -270,17 +251,12 @@ def fit_processes(forms: Sequence[QuadraticForm], design: LocalisationDesign) ->
         [fit_process(own, design, kind) for kind in ((FREE, SLOW) if own.form.windows else (FREE,))]
         for own in subspaces
     ]
-    enough = RIVAL_SHARE * max(own_fits[0].explained for own_fits in fits)
+    enough = 0.5 * max(own_fits[0].explained for own_fits in fits)
     for subspace, own_fits in zip(subspaces, fits, strict=True):
         if subspace.form.windows and own_fits[0].explained >= enough:
             own_fits += [fit_process(subspace, design, state) for state in design.units]
         own_fits.sort(key=lambda fit: -fit.log_evidence)
     return fits
-
-
-def average_log_evidence(fits: Sequence[ProcessFit]) -> float:
-    """Log evidence of an equation whose processes are equally likely before the data."""
-    return float(logsumexp([fit.log_evidence for fit in fits]) - np.log(len(fits)))
 
 
 def _covariance(form: QuadraticForm, kind: str) -> tuple[NDArray, float]:
@@ -291,11 +267,12 @@ def _covariance(form: QuadraticForm, kind: str) -> tuple[NDArray, float]:
     if kind == SLOW:
         run = np.array([window.run for window in windows])
         time = np.array([0.5 * (window.begin + window.end) for window in windows])
-        memory = TIME_MEMORY * max(window.end for window in windows)
+        memory = 0.02 * max(window.end for window in windows)
         apart = np.abs(time[:, None] - time) / memory
         return np.where(run[:, None] == run, np.exp(-apart), 0.0), ROUGH_VARIANCE
     x = np.array([window.states[kind] for window in windows])
-    length = STATE_LENGTH * max(float(np.ptp(x)), np.finfo(float).tiny)
+    # The smooth terms of physics bend once or twice over the range of a state.
+    length = 0.2 * max(float(np.ptp(x)), np.finfo(float).tiny)
     distance = (x[:, None] - x) / length
     return np.exp(-0.5 * distance**2), ROUGH_VARIANCE
 
@@ -309,7 +286,8 @@ def fit_process(subspace: IdentifiableSubspace, design: LocalisationDesign, kind
     strength = np.maximum(strength, 0.0)
     moment = axes.T @ subspace.moment
     # Where no reading tells of this forcing every strength is 0, and any amplitude will do.
-    amplitudes = AMPLITUDES / (np.mean(strength) if np.any(strength) else 1.0)
+    # Variances from no effect to far beyond any gap, three per decade.
+    amplitudes = np.logspace(-3.0, 9.0, 37) / (np.mean(strength) if np.any(strength) else 1.0)
     weights = amplitudes[:, None] / (1.0 + amplitudes[:, None] * strength)
     explained = (weights * strength) @ moment**2
     noise = np.maximum(1.0, (design.chi_square - explained) / design.readings)

@@ -31,16 +31,12 @@ FAR = 8.0
 """Least departure of a wild reading, and least jump at a dropout [noise deviations]: white noise reaches
 6 once in a billion readings. Equal readings in a row are a fault if they are as improbable."""
 
-ROUGHNESS = 20.0
-"""Departure of a wild reading over what its neighbours depart by beyond noise [1]: the cusp of a current
-when an armature lands has 6, a step below 3."""
-
 MOST_FAULTY = 0.5
 """Greatest share of a channel's readings that is a fault [1]: more may be how the plant rests."""
 
-MEDIAN, LONGEST_WILD, NEIGHBOURS, NEARBY = 7, 2, 3, 31
-"""Readings of the running median; wild ones in a row; on each side of a reading that tell its course;
-and around it that tell the noise there."""
+MEDIAN, LONGEST_WILD, NEIGHBOURS = 7, 2, 3
+"""Readings of the running median; wild ones in a row; and on each side of a reading that tell its
+course."""
 
 
 def faults(
@@ -90,7 +86,7 @@ def _wild(readings: NDArray, noise: float, held: bool) -> NDArray:
 def _departing(y: NDArray, noise: float, held: bool) -> NDArray:
     """Places of readings (readings,) that depart from every course through their neighbours."""
     rough = np.pad(np.abs(differences(y, 2)), 1, mode="reflect")
-    scale = np.maximum(noise, NORMAL * median_filter(rough, NEARBY, mode="mirror"))
+    scale = np.maximum(noise, NORMAL * median_filter(rough, 31, mode="mirror"))  # the noise nearby
     smooth = _smooth(y)
     candidates = np.abs(y - smooth) > FAR * scale
     candidates &= ~_in_row(candidates, LONGEST_WILD + 1)
@@ -129,7 +125,8 @@ def _is_lone(y: NDArray, i: int, rest: NDArray, scale: float, held: bool) -> boo
     left, right = (y[b] - y[a]) / (b - a), (y[d] - y[c]) / (d - c)
     expected = [course(i), y[b], y[c], y[b] + left * (i - b), y[c] + right * (i - c)]
     rough = max(float(np.max(np.abs(y[near] - course(near)))) - 2 * scale, 0.0)  # noise leaves 2
-    return bool(np.min(np.abs(y[i] - np.array(expected))) > FAR * scale + ROUGHNESS * rough)
+    # The cusp of a current when an armature lands is 6 times as rough, a step below 3 times.
+    return bool(np.min(np.abs(y[i] - np.array(expected))) > FAR * scale + 20.0 * rough)
 
 
 def _flat(series: Sequence[NDArray], equal: float, far: float) -> Iterator[tuple[int, Kind, NDArray]]:

@@ -20,34 +20,11 @@ from identification.readings_noise import (
     white_noise,
 )
 
-QUIET_SHARE = 0.75
-"""Share of the blocks, those with the least residual, that show a ripple [1]: a wrong form is in the
-others."""
-
-CORRELATED_READINGS = 10.0
-"""Length of a block of residuals in correlated readings [1]: its mean square must not scatter much."""
-
-FEWEST_BLOCKS, FEWEST_MEANS = 8, 40
-"""Fewest blocks that show a ripple, and whose means show a faint correlation."""
-
-LONGEST_CORRELATION = 0.5
-"""Longest lag of the autocovariance, as a share of the longest run [1]: beyond, there are few pairs."""
-
-LEAST_CORRELATION = 0.05
-"""Autocorrelation below which the sum of autocorrelations ends [1]: what follows is chance."""
-
 STEEPEST_DECAY = 2.0
 """Largest ratio of autocovariances at successive readings [1]: what decays faster counts as white."""
 
 SEEN = 3.0
 """Autocorrelation that is no chance, in standard deviations of that of white noise [1]."""
-
-ALWAYS_THERE = 0.6
-"""Mean square of the quiet blocks over that of all [1] from which what they show is always there."""
-
-RIPPLE_SHARE = 0.2
-"""Share of the ripple in what a quiet block holds [1] from which it matters: less hardly moves the
-weights of the readings."""
 
 RAW_TOLERANCE = 1.05
 """Noise that a residual shows over that of the raw readings [1], up to which both agree."""
@@ -146,7 +123,7 @@ def _channel_noise(series: Sequence[NDArray], duration: float, raw: float) -> Ch
 
 def autocovariance(readings: Sequence[NDArray]) -> NDArray:
     """Mean products of readings by lag [1], (lags,), pooled over runs; per run (readings,) [1]."""
-    longest = max(2, int(LONGEST_CORRELATION * max(len(own) for own in readings)))
+    longest = max(2, int(0.5 * max(len(own) for own in readings)))  # beyond, there are few pairs
     total, count = np.zeros(longest + 1), np.zeros(longest + 1)
     for own in readings:
         size = 1 << int(np.ceil(np.log2(2 * len(own))))
@@ -176,7 +153,7 @@ def _correlated(covariance: NDArray) -> float:
     if covariance[0] <= 0:
         return 1.0
     correlation = covariance[1:] / covariance[0]
-    small = np.flatnonzero(correlation < LEAST_CORRELATION)
+    small = np.flatnonzero(correlation < 0.05)
     kept = correlation[: small[0]] if len(small) else correlation
     return float(1.0 + 2.0 * np.sum(kept))
 
@@ -190,7 +167,7 @@ def _faintly_correlated(readings: Sequence[NDArray], mean_square: float) -> floa
     found, length = 1.0, BLOCK_READINGS
     while mean_square > 0:
         means = [float(np.mean(part)) for own in readings for part in _whole_blocks(own, length)]
-        if len(means) < FEWEST_MEANS:
+        if len(means) < 40:
             break
         chance = 1.0 + SEEN * np.sqrt(2.0 / len(means))
         found = max(found, float(length * np.mean(np.square(means)) / (mean_square * chance)))
@@ -208,21 +185,23 @@ def _ripple(readings: Sequence[NDArray], correlated: float, mean_square: float) 
 
     Whether a model of the inputs could predict it is asked elsewhere.
     """
-    length = max(BLOCK_READINGS, round(CORRELATED_READINGS * correlated))
+    # Ten correlated readings: the mean square of a block must not scatter much.
+    length = max(BLOCK_READINGS, round(10.0 * correlated))
     blocks = [part for own in readings for part in _whole_blocks(own, length)]
     blocks.sort(key=lambda part: float(np.mean(part**2)))
-    if len(blocks) < FEWEST_BLOCKS:
+    if len(blocks) < 8:
         return None
-    quiet = blocks[: round(QUIET_SHARE * len(blocks))]
+    quiet = blocks[: round(0.75 * len(blocks))]  # a wrong form is in the others
     covariance = autocovariance(quiet)
     chance = SEEN * covariance[0] / np.sqrt(sum(len(part) for part in quiet))
-    if covariance[1] < chance or covariance[0] < ALWAYS_THERE * mean_square:
+    if covariance[1] < chance or covariance[0] < 0.6 * mean_square:
         return None
     small = np.flatnonzero(covariance[:-1] < max(chance, 0.2 * covariance[1]))
     last = int(small[0]) if len(small) else len(covariance) - 1
     early, late = covariance[1:last], covariance[2 : last + 1]
     decay = float(np.clip(early @ late / (early @ early), 0.0, 0.999))
-    if decay < 1.0 / STEEPEST_DECAY or covariance[1] < RIPPLE_SHARE * covariance[0]:
+    # What is fainter hardly moves the weights of the readings.
+    if decay < 1.0 / STEEPEST_DECAY or covariance[1] < 0.2 * covariance[0]:
         return None
     rippling = min(float(covariance[1]) / decay, float(covariance[0]))
     return Ripple.of(rippling, float(covariance[0]) - rippling, decay)

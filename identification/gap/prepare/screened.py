@@ -1,6 +1,6 @@
 """Recordings are screened before anything is fitted: no fit rests on what is faulty, and it is named."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -82,7 +82,13 @@ def screen(
         for i, kind, samples in faults([runs[r].inputs[name] for r in own]):
             inputs[own[i]][name] = bridged(inputs[own[i]][name], samples)
             found.append(_finding(runs[own[i]], name, samples, kind))
-    unusable = list(_unusable(runs, kept, outputs))
+    unusable = [
+        f"run {run.name}: {np.sum(before & ~after)} of {np.sum(before)} readings of channel {name} are "
+        "wild, stuck, clipped or lost: leave the run out, or trust none of them"
+        for run, left in zip(runs, kept, strict=True)
+        for name, before, after in zip(outputs, run.trusted, left.trusted, strict=True)
+        if np.sum(before & ~after) > MOST_FAULTY * np.sum(before)
+    ]
     if unusable:
         raise PlantError("\n".join(unusable))
     return tuple(kept), tuple(found)
@@ -97,13 +103,3 @@ def bridged(signal: NDArray, samples: NDArray) -> NDArray:
     """The signal (samples,) with straight lines across some samples."""
     good = np.setdiff1d(np.arange(len(signal)), samples)
     return np.interp(np.arange(len(signal)), good, signal[good]) if len(good) else signal
-
-
-def _unusable(runs: Sequence[Run], kept: Sequence[Run], names: Sequence[str]) -> Iterator[str]:
-    for run, left in zip(runs, kept, strict=True):
-        for name, before, after in zip(names, run.trusted, left.trusted, strict=True):
-            if np.sum(before & ~after) > MOST_FAULTY * np.sum(before):
-                yield (
-                    f"run {run.name}: {np.sum(before & ~after)} of {np.sum(before)} readings of channel "
-                    f"{name} are wild, stuck, clipped or lost: leave the run out, or trust none of them"
-                )

@@ -5,16 +5,13 @@ a few forms, differences of the model's own outputs, that together come near any
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
 from identification.gap.plant import GreyBox, StateEquation, noise_weighted
-
-TIMING = "timing"
-"""Name of the place where all channels are late together."""
 
 LAGS, DELAYS = (1, 3, 10, 30), (1, 2, 4, 8, 16)
 """Time constants of first-order lags, and delays [samples]: their sums come near any lag or delay."""
@@ -46,37 +43,32 @@ def reading_faults(
     faults = [
         ReadingFault(
             place=_place(f"reading {channel.name}", "sensor"),
-            changes=[_sensor_forms(y, c, LAGS) for y in outputs],
+            changes=[_sensor_forms(y, c) for y in outputs],
             either_sign=np.arange(1 + len(LAGS)) == 0,
         )
         for c, channel in enumerate(plant.channels)
     ]
     late = [np.stack([_delay_change(y, d) for d in DELAYS], axis=2) for y in outputs]
     either_sign = np.zeros(len(DELAYS), dtype=bool)
-    clock = ReadingFault(place=_place(TIMING, "timing"), changes=late, either_sign=either_sign)
-    return [replace(fault, changes=_weighted(plant, runs, fault.changes)) for fault in (*faults, clock)]
+    clock = ReadingFault(place=_place("timing", "timing"), changes=late, either_sign=either_sign)
+    for fault in (*faults, clock):
+        for i, (r, change) in enumerate(zip(runs, fault.changes, strict=True)):
+            fault.changes[i] = noise_weighted(plant, r, change).reshape(-1, change.shape[-1])
+    return [*faults, clock]
 
 
-def _sensor_forms(outputs: NDArray, channel: int, lags: Sequence[int]) -> NDArray:
-    """Changes by gain error and lags of one channel, (channels, samples, forms) [SI].
+def _sensor_forms(outputs: NDArray, channel: int) -> NDArray:
+    """Changes by gain error and LAGS of one channel, (channels, samples, forms) [SI].
 
-    outputs: (channels, samples) [SI]. lags: [samples].
+    outputs: (channels, samples) [SI].
     """
-    changes, y = np.zeros((*outputs.shape, 1 + len(lags))), outputs[channel]
+    changes, y = np.zeros((*outputs.shape, 1 + len(LAGS))), outputs[channel]
     changes[channel, :, 0] = y
-    for form, lag in enumerate(lags, start=1):
+    for form, lag in enumerate(LAGS, start=1):
         keep = np.exp(-1.0 / lag)
         lagging = np.asarray(lfilter([1.0 - keep], [1.0, -keep], y - y[0])) + y[0]
         changes[channel, :, form] = lagging - y
     return changes
-
-
-def _weighted(plant: GreyBox, runs: Sequence[int], changes: Sequence[NDArray]) -> list[NDArray]:
-    """Changes (channels, samples, forms) [SI] as (values, forms) [noise deviations], run by run."""
-    return [
-        noise_weighted(plant, r, change).reshape(-1, change.shape[-1])
-        for r, change in zip(runs, changes, strict=True)
-    ]
 
 
 def physical_forms(moment: NDArray, precision: NDArray, either_sign: NDArray) -> NDArray:

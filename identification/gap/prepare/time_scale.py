@@ -16,23 +16,8 @@ from scipy.signal import correlate
 from identification.gap.plant import GreyBox
 from identification.readings_noise import white_noise
 
-WIDENING = 1.25
-"""Ratio of successive widths over which readings are averaged before their changes are taken [1]: fine
-enough that the choice of a width hardly moves the result."""
-
-CLEAR_SIGNAL = 100.0
-"""Variance of changes relative to that of noise alone [1] from which a width needs no further averaging:
-enough even where the noise is three times as large as the plant says."""
-
-LEAST_SIGNAL = 3.0
-"""The same below which a channel shows no motion at all [1]: what noise reaches by chance."""
-
 FEWEST_WIDTHS = 8
 """Fewest averaging widths that the shortest run must hold [1]: fewer show no course."""
-
-STILL_SHARE = 0.01
-"""Time scale of a plant whose readings show no motion, relative to its shortest run [1]: some hundred
-stretches tell chance from rule."""
 
 
 def time_scale(plant: GreyBox) -> float:
@@ -54,7 +39,8 @@ def time_scale(plant: GreyBox) -> float:
     period = min(float(run.time[1] - run.time[0]) for run in plant.runs)
     scales = [_channel_scale(plant, c) for c in range(len(plant.channels))]
     seen = [scale for scale in scales if scale is not None]
-    still = STILL_SHARE * min(float(run.time[-1] - run.time[0]) for run in plant.runs)
+    # A plant that stands still: some hundred stretches tell chance from rule.
+    still = 0.01 * min(float(run.time[-1] - run.time[0]) for run in plant.runs)
     return max(period, min(seen, default=still))
 
 
@@ -110,13 +96,14 @@ def _averaging_width(series: Sequence[NDArray], noise: float) -> int | None:
     widest = min(len(y) for y in series) // FEWEST_WIDTHS
     widths = [1]
     while widths[-1] < widest:
-        widths.append(max(widths[-1] + 1, round(WIDENING * widths[-1])))
+        widths.append(max(widths[-1] + 1, round(1.25 * widths[-1])))
     squares = [np.mean(np.concatenate([_changes(y, w) for y in series]) ** 2) for w in widths]
     # Readings that stand still without noise have neither.
     expected = np.maximum(2 * noise**2 / np.array(widths), np.finfo(float).tiny)
     clearness = np.array(squares) / expected
-    enough = min(CLEAR_SIGNAL, 0.5 * float(np.max(clearness)))
-    if np.max(clearness) < LEAST_SIGNAL:
+    # A hundred are enough even where the noise is three times as large as the plant says.
+    enough = min(100.0, 0.5 * float(np.max(clearness)))
+    if np.max(clearness) < 3.0:  # which noise reaches by chance
         return None
     return widths[int(np.argmax(clearness >= enough))]
 

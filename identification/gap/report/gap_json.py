@@ -4,6 +4,7 @@ Format epv-gap/3, described in docs/reference/gap-json.md.
 """
 
 import re
+from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,7 @@ from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.gaps import FLOOR
 from identification.gap.fit.laws import in_words
 from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
-from identification.gap.judge.verdict import RankedCause
+from identification.gap.judge.verdict import RankedCause, Ranking
 from identification.gap.locate.localisation import Localisation, MissingTerm
 from identification.gap.search.posterior import variance_inflation
 
@@ -44,45 +45,72 @@ TERM_FORMAT = "epv-term/1"
 
 
 def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = None) -> dict[str, Any]:
-    """The content of gap.json.
+    """The content of gap.json: all its fields.
 
     Args:
         diagnosis: what to write.
         next_experiment: a sentence, empty where none was sought.
         term: name of the file beside gap.json that holds the missing term; None where none was written.
     """
-    conclusion, ranking = diagnosis.conclusion, diagnosis.ranking
-    separability = ranking.separability
-    share, left = share_left(diagnosis), remainder(diagnosis)
-    unexplained, onset = diagnosis.reduction.unexplained, diagnosis.onset
-    location = None
-    if diagnosis.remaining and diagnosis.remaining.forcings:
-        equation = diagnosis.remaining.likeliest.equation
-        location = f"{equation.component}: {equation.name}"
+    conclusion, ranking, reduction = diagnosis.conclusion, diagnosis.ranking, diagnosis.reduction
+    localisation, separability = diagnosis.localisation, ranking.separability
+    left, unexplained, onset = remainder(diagnosis), reduction.unexplained, diagnosis.onset
     with_cause = diagnosis.best.hypothesis if diagnosis.best else ranking.recalibrated
+    labels = {
+        "nominal": NOMINAL,
+        "recalibrated": RECALIBRATED,
+        "with_cause": with_cause.label or RECALIBRATED,
+    }
+    models = {name: reduction.gaps[label] for name, label in labels.items()}
+    overall = {name: gap.overall for name, gap in models.items()}
+    overall["black_box_floor"] = reduction.black_box.overall
+    inclusion = _noticeable(ranking.inclusion)
     return {
         "format": "epv-gap/3",
         "verdict": conclusion.verdict,
-        "where": _where(diagnosis),
+        "where": {
+            "component": conclusion.component_probabilities,
+            "equation": dict(localisation.equation_probabilities),
+            "channel": dict(localisation.channel_gaps),
+            "regimes": [
+                {
+                    "channel": gap.channel,
+                    "regime": gap.regime,
+                    "gap": gap.gap,
+                    "low": gap.low,
+                    "high": gap.high if np.isfinite(gap.high) else None,
+                }
+                for gap in localisation.regime_gaps
+            ],
+        },
         "causes": [_cause(diagnosis, cause) for cause in conclusion.causes[:LISTED_CAUSES]],
         "ambiguity_set": [list(cause.effects) for cause in conclusion.ambiguity_set],
-        "gap": _gap(diagnosis),
+        "gap": {
+            "floor": FLOOR,
+            **{name: interval.value for name, interval in overall.items()},
+            "interval": {name: [interval.low, interval.high] for name, interval in overall.items()},
+            "channel": {
+                name: {channel: interval.value for channel, interval in gap.channels.items()}
+                for name, gap in models.items()
+            },
+            "report_metric_percent": {
+                name: (gap.percent or {}).get("overall") for name, gap in models.items()
+            },
+        },
         "unexplained": {
             "fraction": unexplained.fraction,
             "still_predictable": unexplained.still_predictable,
             "p_value": unexplained.p_value,
-            "location": location,
+            "location": _place(diagnosis.remaining),
         },
-        "inclusion": inclusion(diagnosis),
+        "inclusion": inclusion,
         "levels": {
             "component": conclusion.component_probabilities,
-            "mechanism": inclusion(diagnosis),
-            "form": _forms(diagnosis),
+            "mechanism": inclusion,
+            "form": _noticeable(_forms(ranking)),
         },
         "remainder": {
-            "fraction": share.value,
-            "low": share.low,
-            "high": share.high,
+            **_fraction(share_left(diagnosis)),
             "component": dict(
                 sorted(left.component_probabilities.items(), key=lambda pair: -pair[1]) if left else ()
             ),
@@ -110,19 +138,54 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
     }
 
 
-def _forms(diagnosis: Diagnosis) -> dict[str, float]:
-    """Probability that each form of an effect is part of the gap, of forms with a noticeable one."""
-    ranking, total = diagnosis.ranking, dict[str, float]()
+def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
+    """An entry of `causes`; the last two fields only where the reduction was measured."""
+    label, laws = cause.hypothesis.label, cause.hypothesis.estimate.laws
+    entry: dict[str, Any] = {
+        "effects": list(cause.effects),
+        "probability": cause.probability,
+        "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
+        "form": in_words(laws),
+        "laws": [
+            {
+                "effect": law.cause.label,
+                "argument": law.argument,
+                "low": law.low,
+                "high": law.high,
+                "growth": law.growth(components).tolist(),
+            }
+            for law, components in laws
+        ],
+        "converged": cause.hypothesis.converged,
+    }
+    if label in diagnosis.reduction.shares_closed:
+        entry["shrink"] = _fraction(diagnosis.share_closed(cause))
+        entry["gap"] = diagnosis.reduction.gaps[label].overall.value
+    return entry
+
+
+def _place(left: Localisation | None) -> str | None:
+    """Component and equation where something is most likely missing; None where nothing is located."""
+    if not left or not left.forcings:
+        return None
+    return f"{left.likeliest.equation.component}: {left.likeliest.equation.name}"
+
+
+def _fraction(share: Interval) -> dict[str, float]:
+    return {"fraction": share.value, "low": share.low, "high": share.high}
+
+
+def _noticeable(probabilities: Mapping[str, float]) -> dict[str, float]:
+    return {name: min(float(p), 1.0) for name, p in probabilities.items() if p >= LISTED_INCLUSION}
+
+
+def _forms(ranking: Ranking) -> dict[str, float]:
+    """Probability that each form of an effect is part of the gap."""
+    total = dict[str, float]()
     for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
         for label in hypothesis.labels:
             total[label] = total.get(label, 0.0) + probability
-    return {label: min(share, 1.0) for label, share in total.items() if share >= LISTED_INCLUSION}
-
-
-def inclusion(diagnosis: Diagnosis) -> dict[str, float]:
-    """Probability that each effect is part of the gap, of effects with a noticeable one."""
-    found = diagnosis.ranking.inclusion.items()
-    return {name: min(float(share), 1.0) for name, share in found if share >= LISTED_INCLUSION}
+    return total
 
 
 def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:
@@ -154,66 +217,6 @@ def unit_name(unit: str) -> str:
     """A unit as part of a name: K/J becomes K_per_J, m^2 becomes m2, none 1."""
     named = unit.replace("^", "").replace("/", "_per_").replace("-", "1")
     return re.sub(r"[^A-Za-z0-9]+", "_", named).strip("_") or "1"
-
-
-def _where(diagnosis: Diagnosis) -> dict[str, Any]:
-    localisation = diagnosis.localisation
-    return {
-        "component": diagnosis.conclusion.component_probabilities,
-        "equation": dict(localisation.equation_probabilities),
-        "channel": dict(localisation.channel_gaps),
-        "regimes": [
-            {name: getattr(gap, name) for name in ("channel", "regime", "gap", "low")}
-            | {"high": gap.high if np.isfinite(gap.high) else None}
-            for gap in localisation.regime_gaps
-        ],
-    }
-
-
-def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
-    entry: dict[str, Any] = {
-        "effects": list(cause.effects),
-        "probability": cause.probability,
-        "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
-        "form": in_words(cause.hypothesis.estimate.laws),
-        "laws": [
-            {
-                "effect": law.cause.label,
-                "argument": law.argument,
-                "low": law.low,
-                "high": law.high,
-                "growth": law.growth(components).tolist(),
-            }
-            for law, components in cause.hypothesis.estimate.laws
-        ],
-        "converged": cause.hypothesis.converged,
-    }
-    label = cause.hypothesis.label
-    if label in diagnosis.reduction.shares_closed:
-        share = diagnosis.reduction.shares_closed[label]
-        entry["shrink"] = {"fraction": share.value, "low": share.low, "high": share.high}
-        entry["gap"] = diagnosis.reduction.gaps[label].overall.value
-    return entry
-
-
-def _gap(diagnosis: Diagnosis) -> dict[str, Any]:
-    gaps = diagnosis.reduction.gaps
-    best = diagnosis.best.hypothesis.label if diagnosis.best else RECALIBRATED
-    labels = {"nominal": NOMINAL, "recalibrated": RECALIBRATED, "with_cause": best}
-    overall = {name: gaps[label].overall for name, label in labels.items()}
-    overall["black_box_floor"] = diagnosis.reduction.black_box.overall
-    return {
-        "floor": FLOOR,
-        **{name: interval.value for name, interval in overall.items()},
-        "interval": {name: [i.low, i.high] for name, i in overall.items()},
-        "channel": {
-            name: {channel: i.value for channel, i in gaps[label].channels.items()}
-            for name, label in labels.items()
-        },
-        "report_metric_percent": {
-            name: (gaps[label].percent or {}).get("overall") for name, label in labels.items()
-        },
-    }
 
 
 def write_results(
@@ -297,8 +300,8 @@ def fitted_values(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> dict
     opened = {p.symbol for law in estimate.hypothesis.laws for p in law.parameters}
     values = {s: v for s, v in problem.values(estimate).items() if s not in opened}
     for tolerance, deviation in zip(problem.plant.tolerances, hypothesis.tolerances, strict=True):
-        own = values.get(tolerance.symbol, tolerance.centre)
-        values[tolerance.symbol] = float(own + deviation * tolerance.sd)
+        centre = values.get(tolerance.symbol, tolerance.centre)
+        values[tolerance.symbol] = float(centre + deviation * tolerance.sd)
     return values
 
 

@@ -1,52 +1,55 @@
-"""The report of a diagnosis as sections of the HTML page: sentences, tables and figures."""
+"""The report of a diagnosis as sections of the HTML page: a verdict of one screen, the rest folded."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
 from identification.block_bootstrap import LEVEL
-from identification.gap.diagnosis import Diagnosis
+from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
 from identification.gap.fit.evidence import EvaluatedHypothesis
-from identification.gap.fit.gaps import FLOOR, regimes_of
+from identification.gap.fit.gaps import FLOOR, RegimeGap
 from identification.gap.fit.laws import COMPONENTS
-from identification.gap.judge.verdict import AMBIGUITY_SHARE
-from identification.gap.locate.localisation import Localisation
+from identification.gap.judge.verdict import NO_GAP
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.report.figures import (
+    comparison_figure,
     forcing_figure,
-    heat_map,
     law_figure,
-    location_figure,
     missing_term_figure,
-    ranking_figure,
-    residual_figure,
 )
 from identification.gap.report.gap_json import (
     discrepancy,
     drawn_term,
     parameter_covariance,
     parameter_intervals,
+    remainder,
 )
 from identification.gap.report.quantities import (
     gap_text,
     gap_with_interval,
+    probability_text,
     quantity,
     quantity_with_interval,
+    share_text,
 )
 from identification.gap.report.sentences import (
+    Words,
     at_an_end,
-    component_at_fault,
-    hidden_causes_sentence,
     in_words,
     look_alikes,
-    parameters_at_bounds,
-    share_closed,
-    verdict_sentence,
+    words_of,
 )
-from identification.report.page import ANSWERS, Block, Picture, Section, Table, Text, Verdict
+from identification.report.page import ANSWERS, Block, Picture, Section, Table, Verdict
 
 LEVEL_TEXT = f"{100 * LEVEL:g} %"
 """Probability within the intervals."""
+
+GAP_EXPLAINED = (
+    "The gap is the root mean square of (model - measured)/noise on recordings that were never fitted "
+    f"to: {FLOOR:g} is noise alone. The nominal model has the parameters as given. The recalibrated "
+    "model has its calibrated parameters refitted. With a cause, both are refitted together. Intervals "
+    f"hold {LEVEL_TEXT}."
+)
 
 
 def sections(
@@ -55,141 +58,141 @@ def sections(
     plan: Sequence[Block] = (),
     more: Sequence[Section] = (),
 ) -> list[Section]:
-    """The whole report: verdict, localisation, ranking, what remains, and the next recording.
+    """The whole report: the verdict, and what it rests on.
 
     next_experiment: a sentence or two; empty where none was sought. plan: what it was chosen from. more:
-    sections that follow the remainder.
+    sections that follow the diagnosis.
     """
-    parts = [_verdict(diagnosis, next_experiment), _localisation(diagnosis), _ranking(diagnosis)]
-    parts += [_remainder(diagnosis), *more]
-    if plan:
-        parts.append(Section(title="Next recording", verdicts=[], blocks=list(plan)))
-    return parts
-
-
-def _verdict(diagnosis: Diagnosis, next_experiment: str) -> Section:
-    """The first screen: what it is and how sure, why it is in doubt, what next, and the residual."""
-    status, text = verdict_sentence(diagnosis, "")
-    doubts = [*diagnosis.warnings, *parameters_at_bounds(diagnosis)]
-    verdicts = [Verdict(status=status, text=text)]
-    verdicts += [Verdict(status="doubt", text=f"{doubt}.") for doubt in doubts]
-    if next_experiment:
-        verdicts.append(Verdict(status="note", text=next_experiment))
-    explanation = (
-        "The gap is the root mean square of (model - measured)/noise on recordings that were never "
-        f"fitted to: {FLOOR:g} is noise alone. The nominal model has the parameters as given. The "
-        "recalibrated model has its calibrated parameters refitted. With a cause, both are refitted "
-        f"together. Intervals hold {LEVEL_TEXT}."
-    )
-    return Section(
-        title="Verdict",
-        summary=True,
-        verdicts=verdicts,
-        blocks=[_residuals(diagnosis), calibrated_values(diagnosis, status), Text(text=explanation)],
-    )
-
-
-def _residuals(diagnosis: Diagnosis) -> Picture:
-    """Residuals of the held-out run that recalibration misses most, before and with the best cause."""
-    problem = diagnosis.ranking.problem
-    models = {"recalibrated": diagnosis.ranking.recalibrated}
-    if diagnosis.best:
-        models[f"with {diagnosis.best.hypothesis.title}"] = diagnosis.best.hypothesis
-    squares = [np.mean(residual**2) for residual in diagnosis.ranking.recalibrated.residuals]
-    run = max((r for r, run in enumerate(problem.plant.runs) if run.held_out), key=squares.__getitem__)
-    values = problem.candidate(list(models.values())[-1].estimate)
-    masks = regimes_of(problem.plant, values, run)
-    residuals = {name: model.residuals[run] for name, model in models.items()}
-    return Picture(
-        figure=residual_figure(problem.plant, run, residuals, masks),
-        caption="What the model leaves of the held-out recording that recalibration misses most. Grey: "
-        f"where {LEVEL_TEXT} of the noise lies.",
-    )
-
-
-def _localisation(diagnosis: Diagnosis) -> Section:
-    verdicts = []
-    if diagnosis.named:
-        text = f"Most likely at fault: {component_at_fault(diagnosis)}."
-        verdicts = [Verdict(status="note", text=text)]
-    return Section(
-        title="Where the gap lies",
-        verdicts=verdicts,
-        blocks=[
-            Picture(
-                figure=heat_map(diagnosis.localisation.regime_gaps),
-                caption="Gap after recalibration, by channel and regime; regimes may overlap.",
-            ),
-            Picture(
-                figure=location_figure(diagnosis),
-                caption="Left: the equation or reading in which something is missing, from the residual "
-                "alone, whatever the catalogue. Right: the component at fault, from the named causes "
-                "and the equations.",
-            ),
-        ],
-    )
-
-
-def _ranking(diagnosis: Diagnosis) -> Section:
-    blocks: list[Block] = [
-        Picture(
-            figure=ranking_figure(diagnosis),
-            caption="Probability of each hypothesis; blue, where the verdict names causes: the fewest "
-            f"that hold {100 * AMBIGUITY_SHARE:g} % of the probability of all causes.",
-        )
+    words = words_of(diagnosis)
+    parts = [
+        _verdict(diagnosis, words, next_experiment),
+        Section(title="Values to use", blocks=[calibrated_values(diagnosis, words.status)]),
+        Section(
+            title="How large the gap is",
+            blocks=[GAP_EXPLAINED, gap_table(diagnosis), discrepancy_table(diagnosis)],
+        ),
     ]
-    if diagnosis.judged:
-        blocks.append(ranking_table(diagnosis))
+    if diagnosis.conclusion.verdict != NO_GAP:
+        parts.append(_localisation(diagnosis, words))
+    return [
+        *parts,
+        _causes(diagnosis, words),
+        *more,
+        *([Section(title="Next recording", blocks=plan)] if plan else []),
+    ]
+
+
+def _verdict(diagnosis: Diagnosis, words: Words, next_experiment: str) -> Section:
+    """The first screen: what it is and how sure, why it is in doubt, what shows it, what next."""
+    verdicts = [
+        Verdict(status=words.status, text=words.what),
+        *(Verdict(status="why", text=doubt) for doubt in words.doubts),
+        *([Verdict(status="next", text=next_experiment)] if next_experiment else []),
+    ]
+    caption = "Readings and model before and after, on a recording that was never fitted to."
+    picture = Picture(figure=comparison_figure(diagnosis), caption=caption)
+    return Section(title="Verdict", summary=True, verdicts=verdicts, blocks=[picture])
+
+
+def _localisation(diagnosis: Diagnosis, words: Words) -> Section:
+    """The gap by regime, the probability of each place, and the shape of what is missing."""
+    localisation, left = diagnosis.localisation, remainder(diagnosis)
+    titles = {f.equation.name: f.equation.title for f in localisation.forcings}
+    equations = {titles.get(k, k): p for k, p in localisation.equation_probabilities.items()}
+    equations["nothing missing"] = localisation.nothing_missing
+    components = diagnosis.conclusion.component_probabilities
+    blocks: list[Block] = [
+        regime_table(localisation.regime_gaps),
+        probability_table(
+            "Component", {name.replace("_", " "): p for name, p in components.items()},
+            "From the named causes and the equations.",
+        ),
+        probability_table(
+            "Equation or reading", equations,
+            "Where something is missing, from the residual alone, whatever the catalogue.",
+        ),
+    ]  # fmt: skip
+    if left and left.missing_term:
+        forcing, term = left.likeliest, drawn_term(left)
+        named = f"with {diagnosis.named.hypothesis.title}" if diagnosis.named else "recalibrated"
+        figure = (
+            missing_term_figure(term)
+            if term
+            else forcing_figure(diagnosis.ranking.problem.plant, forcing)
+        )
+        caption = f"What the model ({named}) lacks in {forcing.equation.title} to meet the recordings"
+        over = f", over the state that explains {term.explained:.0%} of it." if term else ", over time."
+        blocks.append(Picture(figure=figure, caption=caption + over))
+    verdict = Verdict(status="note", text=words.where)
+    return Section(
+        title="Where the gap lies", verdicts=[verdict] if diagnosis.named else [], blocks=blocks
+    )
+
+
+def regime_table(gaps: Sequence[RegimeGap]) -> Table:
+    """Gap of every channel in every regime, with its interval."""
+    channels = list(dict.fromkeys(gap.channel for gap in gaps))
+    cells = {
+        (gap.regime, gap.channel): f"{gap_text(gap.gap)} "
+        + (f"({gap_text(gap.low)} to {gap_text(gap.high)})" if np.isfinite(gap.high) else "(too rare)")
+        + ("" if gap.held_out else " *")
+        for gap in gaps
+    }
+    rows = [
+        [regime.replace("_", " "), *(cells.get((regime, channel), "-") for channel in channels)]
+        for regime in dict.fromkeys(gap.regime for gap in gaps)
+    ]
+    caption = "Gap after recalibration, by regime and channel; regimes may overlap."
+    if not all(gap.held_out for gap in gaps):
+        caption += " * too rare in recordings never fitted to: all recordings."
+    return Table(columns=["Regime", *channels], rows=rows, caption=caption)
+
+
+def probability_table(heading: str, probabilities: Mapping[str, float], caption: str) -> Table:
+    """Probabilities that are worth a mention, the highest first."""
+    ordered = sorted(probabilities.items(), key=lambda pair: -pair[1])
+    rows = [[name, probability_text(p)] for name, p in ordered if p >= MENTIONED_PROBABILITY]
+    return Table(columns=[heading, "probability"], rows=rows, caption=caption)
+
+
+def _causes(diagnosis: Diagnosis, words: Words) -> Section:
+    """The causes with their probabilities, their laws, and what the recordings cannot show."""
+    blocks: list[Block] = [ranking_table(diagnosis)]
     if diagnosis.named:
         blocks += drawn_laws(diagnosis, diagnosis.named.hypothesis)
-    verdict = Verdict(status="note", text=hidden_causes_sentence(diagnosis))
-    return Section(title="Which cause it is", verdicts=[verdict], blocks=blocks)
-
-
-def _remainder(diagnosis: Diagnosis) -> Section:
-    """What each model leaves, what no named cause explains, and what is only disturbance."""
-    blocks: list[Block] = [gap_table(diagnosis)]
-    left = diagnosis.remaining if diagnosis.named else diagnosis.localisation
-    if left and left.missing_term:
-        blocks += _missing_term(diagnosis, left)
-    return Section(title="What remains", verdicts=[], blocks=[*blocks, discrepancy_table(diagnosis)])
-
-
-def _missing_term(diagnosis: Diagnosis, left: Localisation) -> list[Block]:
-    """The missing term over time, and over a state where one explains it."""
-    forcing, named = left.likeliest, diagnosis.named
-    model = f"The model with {named.hypothesis.title}" if named else "The recalibrated model"
-    blocks: list[Block] = [
-        Picture(
-            figure=forcing_figure(diagnosis.ranking.problem.plant, forcing),
-            caption=f"{model} lacks this term in {forcing.equation.title}: the forcing with which it "
-            "meets the recordings.",
-        )
-    ]
-    if term := drawn_term(left):
-        caption = "The missing term over the state that explains it best."
-        blocks.append(Picture(figure=missing_term_figure(term), caption=caption))
-    return blocks
+    verdict = Verdict(status="note", text=words.hidden)
+    return Section(title="Which causes were weighed", verdicts=[verdict], blocks=blocks)
 
 
 def ranking_table(diagnosis: Diagnosis) -> Table:
-    """Judged causes with their sizes, the share that each closes, and look-alikes."""
+    """Causes that are worth a mention: their sizes, the share that each closes, and look-alikes."""
+    ranking, named = diagnosis.ranking, diagnosis.conclusion.ambiguity_set
     rows = []
     for cause in diagnosis.judged:
+        if cause.probability < MENTIONED_PROBABILITY and cause not in (*named, diagnosis.best):
+            continue
         intervals = parameter_intervals(diagnosis, cause.hypothesis)
-        hypothesis = cause.hypothesis.estimate.hypothesis
-        components = dict.fromkeys(c.component.replace("_", " ") for c in hypothesis.causes)
-        sizes = [
+        sizes = "; ".join(
             f"{p.title} = {quantity_with_interval(*intervals[p.symbol], p.unit)}"
-            for p in hypothesis.cause_parameters
-        ]
-        closed, alike = share_closed(diagnosis, cause), look_alikes(diagnosis, cause)
-        rows.append([cause.hypothesis.title, ", ".join(components), "; ".join(sizes), closed, alike])
+            for p in cause.hypothesis.estimate.hypothesis.cause_parameters
+        )
+        closed = share_text(diagnosis.share_closed(cause))
+        probability = probability_text(cause.probability)
+        title, alike = cause.hypothesis.title, look_alikes(diagnosis, cause)
+        rows.append([title, probability, sizes, closed, alike])
+    judged = sum(cause.probability for cause in diagnosis.judged)
+    others = {
+        "all other sets of causes": sum(ranking.probabilities) - judged,
+        "no cause": ranking.no_cause,
+        "not in the catalogue": ranking.unknown,
+    }
+    rest = probability_table("", others, "").rows
     return Table(
-        columns=["Cause", "component", f"size ({LEVEL_TEXT})", "closes", "looks like"],
-        rows=rows,
-        caption="'Looks like': causes that these recordings hardly tell apart from this one, with the "
-        "correlation of both effects; from the model's sensitivities alone, whatever the residual.",
+        columns=["Cause", "probability", f"size ({LEVEL_TEXT})", "closes", "looks like"],
+        rows=[*rows, *([*row, "-", "-", "-"] for row in rest)],
+        caption=f"Causes with a probability of {MENTIONED_PROBABILITY:.0%} or more. 'Looks like': "
+        "causes that these recordings hardly tell apart from this one, with the correlation of both "
+        "effects; from the model's sensitivities alone, whatever the residual.",
     )
 
 
@@ -203,11 +206,11 @@ def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Bl
     drawn = []
     for law, components in estimate.laws:
         growth, size = law.growth(components), law.cause.sizes[0]
-        own = [symbols.index(p.symbol) for p in (*law.parameters, size)]
+        places = [symbols.index(p.symbol) for p in (*law.parameters, size)]
         value = problem.values(estimate)[size.symbol] - size.nominal
         # A larger size with a smaller g is the same strength: both count together.
         slopes = np.column_stack([COMPONENTS, (1.0 + growth) / value])
-        sd = np.sqrt(np.diag(slopes @ covariance[np.ix_(own, own)] @ slopes.T))
+        sd = np.sqrt(np.diag(slopes @ covariance[np.ix_(places, places)] @ slopes.T))
         drawn.append((law, growth, sd))
     values, plant = problem.candidate(estimate), prepared(problem.plant)
     traces = plant.law_states(values, problem.fitted_runs[0])
@@ -221,19 +224,19 @@ def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Bl
 
 def discrepancy_table(diagnosis: Diagnosis) -> Table:
     """What model and recordings differ by beyond noise under the best hypothesis, by channel."""
-    seen = discrepancy(diagnosis)
+    channels = diagnosis.ranking.problem.plant.channels
+    rows = [
+        [
+            channel.name,
+            quantity((channel.noise or 0.0) / channel.scale, channel.unit),
+            quantity(seen["sd"], channel.unit) if seen["sd"] else "none seen",
+            quantity(seen["time_scale_s"], "s") if seen["sd"] else "-",
+        ]
+        for channel, seen in zip(channels, discrepancy(diagnosis).values(), strict=True)
+    ]
     return Table(
         columns=["Channel", "noise", "discrepancy", "correlated over"],
-        rows=[
-            [
-                channel.name,
-                quantity((channel.noise or 0.0) / channel.scale, channel.unit),
-                quantity(own["sd"], channel.unit) if own["sd"] else "none seen",
-                quantity(own["time_scale_s"], "s") if own["sd"] else "-",
-            ]
-            for channel in diagnosis.ranking.problem.plant.channels
-            for own in [seen[channel.name]]
-        ],
+        rows=rows,
         caption="Standard deviations of the sensor noise and of what differs beyond it under the best "
         "hypothesis: errors of its form, and disturbances.",
     )
@@ -273,26 +276,26 @@ def gap_table(diagnosis: Diagnosis) -> Table:
 
 def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
     """Calibrated parameters of the model to use, with intervals; status: of the verdict."""
-    kept = diagnosis.kept
-    intervals = parameter_intervals(diagnosis, kept)
+    model = diagnosis.kept
+    intervals = parameter_intervals(diagnosis, model)
     rows, statuses = [], []
     for parameter in diagnosis.ranking.problem.plant.parameters:
         interval = intervals[parameter.symbol]
-        own = "bad" if at_an_end(parameter, interval[0]) else status
-        why = ": at an end of its range" if own != status else ""
+        at_end = at_an_end(parameter, interval[0])
+        statuses.append("bad" if at_end else status)
+        reason = "at an end of its range" if at_end else "see the verdict"
         rows.append(
             [
                 parameter.title,
                 quantity(parameter.nominal, parameter.unit),
                 quantity_with_interval(*interval, parameter.unit),
-                ANSWERS[own] + why,
+                ANSWERS[statuses[-1]] + ("" if statuses[-1] == "good" else f": {reason}"),
             ]
         )
-        statuses.append(own)
-    model = f"with {kept.title}" if kept.labels else f"{diagnosis.kept_label}, without a cause"
+    name = f"with {model.title}" if model.labels else f"{diagnosis.kept_label}, without a cause"
     return Table(
         columns=["Parameter", "nominal", f"fitted ({LEVEL_TEXT} interval)", "trust it"],
         rows=rows,
         statuses=statuses,
-        caption=f"Calibrated parameters of the model to use: {model}.",
+        caption=f"Calibrated parameters of the model to use: {name}.",
     )

@@ -5,24 +5,24 @@ that the law follows promises most by linear prediction. The best sets get one l
 pays.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit, linearise
 from identification.gap.fit.laws import MOST_LAWS
 from identification.gap.fit.recalibration import with_own_nuisances
-from identification.gap.fit.variable_projection import LinearisedRun, normal_equations
+from identification.gap.fit.variable_projection import normal_equations
 from identification.gap.plant import GreyBox
 from identification.gap.search.law_screening import law_starts, over_reached_states
 from identification.gap.search.posterior import Posterior, posterior, tolerated_misfit
 from identification.gap.search.screening import (
     CauseSignature,
-    Start,
     best_start_of_each,
     screen_causes,
     simulate_signatures,
@@ -33,35 +33,14 @@ from identification.gap.search.screening import (
 MOST_CAUSES = 4
 """Largest number of causes that are taken to act together."""
 
-LAW_PRICE = 2.0
-"""Factor by which an open law must lower the misfit [1]: the law of the catalogue is kept where it is
-about as good, and the two laws are left to those causes that need them."""
-
 # Numbers for the sake of computing time.
 
 MULTI_START_CAUSES = 12
 """Largest catalogue of which every cause is refitted from each of its trial values, and every pair:
 causes may help together that do not help alone. A larger one begins at the most promising values."""
 
-PARTNERS = 8
-"""Causes of a large catalogue that are refitted beside a set."""
-
-STARTS = 1
-"""The most promising starts of a set of causes that are fitted, with the law assumed and with an open
-one; in a small catalogue all starts with the law assumed."""
-
-FAR_WORSE = 10.0
-"""Factor on what the best set leaves, beyond which another set of as many causes is not followed [1]."""
-
-HELPED = 0.8
-"""Share of what the sets of one cause less leave, up to which a cause has helped and another one may
-[1]."""
-
 FINALISTS = 4
 """Best sets of one size that are fitted further, with nuisance slopes of their own and other laws."""
-
-BASES = 2
-"""The best sets of one size to which another cause is added."""
 
 FIRST_ITERATIONS = 5
 """Most steps of the first fits: those of finalists go on."""
@@ -84,6 +63,7 @@ class HypothesisPool:
         self.readings = sum(int(np.sum(run.trusted)) for run in problem.plant.runs)
         self.tolerated = tolerated_misfit(self.readings)
         self._best: dict[frozenset[str], EvaluatedHypothesis] = {}
+        self._posterior: Posterior | None = None
         self._finished: set[str] = set()
 
     def add(self, estimates: Iterable[Estimate]) -> None:
@@ -96,43 +76,44 @@ class HypothesisPool:
             labels = frozenset(evaluated.labels)
             present = self._best.get(labels)
             if present is None or self._order(evaluated) < self._order(present):
-                self._best[labels] = evaluated
+                self._best[labels], self._posterior = evaluated, None
 
     def _order(self, evaluated: EvaluatedHypothesis) -> tuple[float, float]:
         """The less, the better; within noise the better fit counts."""
         return self._cost(evaluated), misfit(evaluated)
 
     def _cost(self, evaluated: EvaluatedHypothesis) -> float:
-        """What counts when one of two fits of a set is kept [nats]: an open law must pay."""
+        """What counts when one of two fits of a set is kept [nats]: an open law must halve it.
+
+        So the law of the catalogue is kept where it is about as good, and the two laws are left to those
+        causes that need them.
+        """
         left = max(0.5 * (misfit(evaluated) - self.readings), 0.0)
-        return (left + self.tolerated) * LAW_PRICE ** len(evaluated.estimate.hypothesis.laws)
+        return (left + self.tolerated) * 2.0 ** len(evaluated.estimate.hypothesis.laws)
 
     def __contains__(self, labels: frozenset[str]) -> bool:
         """Whether a set of causes was refitted."""
         return labels in self._best
 
     def posterior(self) -> Posterior:
-        """All hypotheses with causes, and their probabilities."""
-        return posterior(self.problem, self.recalibrated, list(self._best.values()))
+        """All hypotheses with causes, and their probabilities; weighed once for each change."""
+        if self._posterior is None:
+            self._posterior = posterior(self.problem, self.recalibrated, list(self._best.values()))
+        return self._posterior
 
-    def ranked(self, number: int | None = None) -> list[EvaluatedHypothesis]:
-        """Hypotheses with a number of causes, or all, the most probable first."""
-        found = self.posterior().hypotheses
-        return [each for each in found if number is None or len(each.labels) == number]
-
-    def by_cost(self) -> list[tuple[EvaluatedHypothesis, float]]:
-        """All hypotheses with what they leave, laws priced [nats], the least first."""
-        pairs = [(each, self._cost(each)) for each in self._best.values()]
-        return sorted(pairs, key=lambda pair: pair[1])
+    def least_cost(self, number: int) -> float:
+        """What the best set of a number of causes leaves, laws priced [nats]; infinity without one."""
+        sets = (each for each in self._best.values() if len(each.labels) == number)
+        return min((self._cost(each) for each in sets), default=np.inf)
 
     def much_is_left(self) -> bool:
         """Whether the best hypothesis leaves more than what no model is free of."""
         return min(self.posterior().misfits, default=0.0) > self.tolerated
 
     def promising(self, number: int, most: int) -> list[EvaluatedHypothesis]:
-        """The best sets of a number of causes that do not leave far more than the best of them."""
-        ranked = self.ranked(number)[:most]
-        return [each for each in ranked if self._cost(each) <= FAR_WORSE * self._cost(ranked[0])]
+        """The best sets of a number of causes, but none that leaves ten times more than the best."""
+        ranked = [each for each in self.posterior().hypotheses if len(each.labels) == number][:most]
+        return [each for each in ranked if self._cost(each) <= 10.0 * self._cost(ranked[0])]
 
     def finish(self, number: int) -> None:
         """Fit the best sets of a number of causes further: own nuisances, then one law more.
@@ -160,9 +141,10 @@ class HypothesisPool:
         def fits() -> list[Estimate]:
             starts = []
             for each in chosen:
-                causes = each.estimate.hypothesis.causes
-                found = law_starts(self.problem, [each.estimate] * len(causes), causes)
-                starts += [start.estimate for start in found[:STARTS]]
+                base, causes = each.estimate, each.estimate.hypothesis.causes
+                runs = _most_misfitting(self.problem, each.residuals)
+                found = law_starts(self.problem, base, [base] * len(causes), causes, runs)
+                starts += [start.estimate for start in found[:1]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
         name = _names(chosen)
@@ -182,74 +164,61 @@ def _names(chosen: Sequence[EvaluatedHypothesis]) -> str:
     return "; ".join(_name(each) for each in chosen)
 
 
-def search_causes(
-    pool: HypothesisPool,
-    base: Estimate,
-    signatures: Sequence[CauseSignature],
-    most_causes: int = MOST_CAUSES,
-) -> None:
+def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]) -> None:
     """Refit the promising sets of causes into the pool.
 
     Args:
         pool: begins without causes.
         base: the recalibrated model.
         signatures: of all causes beside it.
-        most_causes: largest number of causes of a set.
     """
-    pool.add(_fits_beside(pool, base, signatures))
+    _fit_beside(pool, base, signatures)
     if pool.small:
         # Without the cause recalibration may have ended in a corner, far from the truth.
         nominal = pool.problem.start(Hypothesis(causes=()), {})
-        pool.add(_fits_beside(pool, nominal, signatures, "the nominal model"))
+        _fit_beside(pool, nominal, name="the nominal model")
     pool.finish(1)
-    for number in range(2, most_causes + 1):
-        if not _another_cause_may_act(pool, number):
+    for number in range(2, MOST_CAUSES + 1):
+        if not pool.much_is_left():
             break
-        for smaller in pool.promising(number - 1, BASES):
-            pool.add(_fits_beside(pool, smaller.estimate, signatures))
+        helped = pool.least_cost(number - 1) <= 0.8 * pool.least_cost(number - 2)
+        if number > 2 and not pool.small and not helped:
+            break  # the last cause has not removed a fifth
+        for smaller in pool.promising(number - 1, 2):
+            _fit_beside(pool, smaller.estimate)
         if number == 2 and pool.small:
             _fit_pairs(pool, base, signatures)
         pool.finish(number)
     _leave_causes_out(pool)
 
 
-def _another_cause_may_act(pool: HypothesisPool, number: int) -> bool:
-    """Whether sets of `number` causes are worth a search: much is left, and the last cause helped."""
-    if not pool.much_is_left():
-        return False
-    best = {len(each.labels): cost for each, cost in reversed(pool.by_cost())}
-    return number <= 2 or pool.small or best.get(number - 1, np.inf) <= HELPED * best[number - 2]
+def _fit_beside(
+    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature] = (), name: str = ""
+) -> None:
+    """Fit a set with each of the most promising further causes, as assumed and with an open law.
 
-
-def _fits_beside(
-    pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature], name: str = ""
-) -> list[Estimate]:
-    """Fits of a set with each of the most promising further causes, as assumed and with an open law.
-
-    base: the set's estimate. signatures: of all causes beside the recalibrated model; those that promise
-    something beside the set are simulated there. name: of the base where sets that were fitted are
-    fitted again.
+    base: the set's estimate. signatures: of all causes beside it, where they are known. name: of the
+    base where sets that were fitted are fitted again.
     """
     problem, hypothesis = pool.problem, base.hypothesis
-    own = {cause.name for cause in hypothesis.causes}
+    known = {cause.name for cause in hypothesis.causes}
     others = [
-        signature
-        for signature in signatures
-        if signature.cause.name not in own
-        and (name or frozenset((*hypothesis.labels, signature.cause.label)) not in pool)
+        cause
+        for cause in problem.plant.causes
+        if cause.name not in known and (name or frozenset((*hypothesis.labels, cause.label)) not in pool)
     ]
     if not others:
-        return []
+        return
 
     def fits() -> list[Estimate]:
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
-        causes = list({signature.cause.label: signature.cause for signature in others}.values())
-        beside = simulate_signatures(problem, base, causes)
+        beside = signatures or simulate_signatures(problem, base, others)
         assumed = screen_causes(problem, base, base_runs, beside, every_start=pool.small)
         # Chi-squares of some of the runs are compared as shares of what the base leaves of them.
-        runs = _most_misfitting(problem, base_runs)
+        residuals = dict(zip(problem.fitted_runs, (run.residual for run in base_runs), strict=True))
+        runs = _most_misfitting(problem, residuals)
         estimates = [start.estimate for start in assumed]
-        opened = law_starts(problem, estimates, [start.cause for start in assumed], runs)
+        opened = law_starts(problem, base, estimates, [start.cause for start in assumed], runs)
         promise = {start.labels: start.chi_square / base.chi_square for start in reversed(assumed)}
         whole = normal_equations(
             [run for run, r in zip(base_runs, problem.fitted_runs, strict=True) if r in runs]
@@ -258,20 +227,20 @@ def _fits_beside(
             share = start.chi_square / whole
             promise[start.labels] = min(promise.get(start.labels, np.inf), share)
         best = sorted(promise, key=lambda labels: promise[labels])
-        kept = set(best if pool.small else best[:PARTNERS])
-        starts = [
-            start
-            for part, most in ((assumed, len(assumed) if pool.small else STARTS), (opened, STARTS))
-            for start in _best_starts([start for start in part if start.labels in kept], most)
-        ]
+        kept = set(best if pool.small else best[:8])
+        first, opened = ([s for s in part if s.labels in kept] for part in (assumed, opened))
+        starts = [*(first if pool.small else best_start_of_each(first)), *best_start_of_each(opened)]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    return pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
+    pool.add(pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits))
 
 
-def _most_misfitting(problem: FittingProblem, base_runs: Sequence[LinearisedRun]) -> list[int]:
-    """The fitted runs with the largest mean square residuals, up to half of all samples."""
-    squares = [float(np.mean(run.residual**2)) for run in base_runs]
+def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:
+    """The fitted runs with the largest mean square residuals, up to half of all samples.
+
+    residuals: by index of the run, of any shape [noise deviations].
+    """
+    squares = [float(np.mean(residuals[r] ** 2)) for r in problem.fitted_runs]
     lengths = {r: len(problem.plant.runs[r].time) for r in problem.fitted_runs}
     order = [problem.fitted_runs[i] for i in np.argsort(squares)[::-1]]
     before = np.cumsum([0, *(lengths[r] for r in order)])[:-1]
@@ -285,36 +254,19 @@ def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseS
     def fits() -> list[Estimate]:
         base_runs = linearise(problem, [base], problem.fitted_runs)[0]
         screened = screen_causes(problem, base, base_runs, signatures)
-        together = [
-            _both(problem, base, first, second)
-            for first, second in combinations(screened, 2)
-            if first.cause.name != second.cause.name
-        ]
-        starts = _best_starts(simulated_starts(problem, base, base_runs, together), STARTS)
+        together = []
+        for pair in combinations(screened, 2):
+            if pair[0].cause.name != pair[1].cause.name:
+                joint = base
+                for start in pair:
+                    values = problem.values(start.estimate)
+                    sizes = {p.symbol: values[p.symbol] for p in start.cause.parameters}
+                    joint = with_cause(problem, joint, start.cause, sizes)
+                together.append(joint)
+        starts = best_start_of_each(simulated_starts(problem, base, base_runs, together))
         return fit(problem, [start.estimate for start in starts], base.chi_square)
 
     pool.add(pool.cache("pairs", fits))
-
-
-def _both(problem: FittingProblem, base: Estimate, first: Start, second: Start) -> Estimate:
-    """The base with the causes of two starts at their values there."""
-    joint = base
-    for start in (first, second):
-        values, parameters = problem.values(start.estimate), start.cause.parameters
-        joint = with_cause(problem, joint, start.cause, {p.symbol: values[p.symbol] for p in parameters})
-    return joint
-
-
-def _best_starts(starts: Sequence[Start], most: int) -> list[Start]:
-    """The best starts of each set of causes, up to a number."""
-    kept: list[Start] = []
-    left = list(starts)
-    for _ in range(most):
-        best = best_start_of_each(left)
-        kept += best
-        taken = {id(start) for start in best}
-        left = [start for start in left if id(start) not in taken]
-    return kept
 
 
 def _leave_causes_out(pool: HypothesisPool) -> None:
@@ -324,7 +276,7 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
     """
     problem = pool.problem
     for _ in range(MOST_CAUSES - 1):
-        ranked = pool.ranked()
+        ranked = pool.posterior().hypotheses
         if not ranked or len(ranked[0].labels) < 2:
             return
         best = ranked[0]
@@ -336,5 +288,5 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
         name = f"without one of {' and '.join(best.labels)}"
         pool.add(pool.cache(name, lambda starts=starts: fit(problem, starts)))
         pool.finish(len(hypothesis.causes) - 1)
-        if pool.ranked()[0].labels == best.labels:
+        if pool.posterior().hypotheses[0].labels == best.labels:
             return

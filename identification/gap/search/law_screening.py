@@ -5,7 +5,7 @@ at nearly nothing: with the wrong law a fit may send the true cause there. One s
 says what each law promises.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,36 +19,29 @@ from identification.gap.plant import Cause
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.search.screening import Start
 
-SMALL_SIZE = 0.3
-"""Size, in trial sizes, below which a law is opened at the trial size [1]."""
-
 TOGETHER = 4
 """Causes whose laws are linearised together, for memory."""
-
-LEAST_MEAN = 0.1
-"""Least factor on a size that stands for the mean of its law [1]."""
-
-STEP_DAMPING = 1e-3
-"""Damping of the step, relative to the diagonal [1]: nearly none."""
 
 
 def law_starts(
     problem: FittingProblem,
+    base: Estimate,
     estimates: Sequence[Estimate],
     causes: Sequence[Cause],
-    runs: Sequence[int] | None = None,
+    runs: Sequence[int],
 ) -> list[Start]:
     """Starts with one more open law, by the chi-square that they promise, the least first.
 
     Args:
         problem: the plant with its readings.
+        base: whose states, which change, the laws may follow.
         estimates: from which the law is opened.
         causes: whose law, by estimate; the estimate has the cause.
-        runs: indices of the runs that count; None: all fitted ones.
+        runs: indices of the runs that count.
     """
-    runs = problem.fitted_runs if runs is None else runs
     if not getattr(problem.plant, "law_arguments", ()):
         return []
+    ranges = {name: ends for name, ends in _ranges(problem, base, runs).items() if ends[0] < ends[1]}
     pairs = [
         (at_least_trial_size(problem, estimate, cause), cause)
         for estimate, cause in zip(estimates, causes, strict=True)
@@ -57,7 +50,7 @@ def law_starts(
     starts: list[Start] = []
     for first in range(0, len(pairs), TOGETHER):
         part = pairs[first : first + TOGETHER]
-        opened = [_with_every_law(problem, estimate, cause, runs) for estimate, cause in part]
+        opened = [_with_every_law(problem, estimate, cause, ranges) for estimate, cause in part]
         linearised = linearise(problem, opened, runs)
         for (estimate, _), whole, own in zip(part, opened, linearised, strict=True):
             starts += _starts(problem, estimate, whole, own)
@@ -81,7 +74,7 @@ def _starts(
         places = np.concatenate([np.arange(first), components, behind])
         columns = np.concatenate([[0], 1 + places, shared])
         equations = equations_of(products.of(columns), len(places))
-        step, decrease = equations.step(low[places], high[places], STEP_DAMPING)
+        step, decrease = equations.step(low[places], high[places], damping=1e-3)  # nearly none
         hypothesis = replace(estimate.hypothesis, laws=(*estimate.hypothesis.laws, law))
         yield Start(
             estimate=replace(estimate, hypothesis=hypothesis, vector=whole.vector[places] + step),
@@ -93,7 +86,7 @@ def at_least_trial_size(problem: FittingProblem, estimate: Estimate, cause: Caus
     """The estimate as a start, with a cause at its first trial where its size is nearly nothing."""
     values = problem.values(estimate)
     sizes = [abs((values[p.symbol] - p.nominal) / (p.trials[0] - p.nominal)) for p in cause.sizes]
-    if max(sizes) >= SMALL_SIZE:
+    if max(sizes) >= 0.3:
         return restarted(estimate)
     trial = {p.symbol: p.trials[0] for p in cause.sizes}
     begun = problem.start(estimate.hypothesis, {**values, **trial})
@@ -101,15 +94,18 @@ def at_least_trial_size(problem: FittingProblem, estimate: Estimate, cause: Caus
 
 
 def _with_every_law(
-    problem: FittingProblem, estimate: Estimate, cause: Cause, runs: Sequence[int]
+    problem: FittingProblem, estimate: Estimate, cause: Cause, ranges: Mapping[str, tuple[float, float]]
 ) -> Estimate:
-    """The estimate with the law of a cause open over every state that changes; all as assumed yet."""
+    """The estimate with the law of a cause open over every state; all as assumed yet.
+
+    ranges: least and greatest value of the states, by name [SI].
+    """
     known = estimate.hypothesis.laws
     taken = {law.argument for law in known if law.cause.label == cause.label}
     laws = [
         Law(cause=cause, argument=argument, low=low, high=high)
-        for argument, (low, high) in _ranges(problem, estimate, runs).items()
-        if argument not in taken and low < high
+        for argument, (low, high) in ranges.items()
+        if argument not in taken
     ]
     hypothesis = replace(estimate.hypothesis, laws=(*known, *laws))
     begun = problem.start(hypothesis, problem.values(estimate))
@@ -145,13 +141,12 @@ def over_reached_states(problem: FittingProblem, estimate: Estimate) -> Estimate
         moved = replace(law, low=low, high=high) if low < high else law
         growth = law.at(components, moved.knots)
         mean = float(np.mean(growth))
-        parts = np.linalg.lstsq(COMPONENTS, (growth - mean) / max(1.0 + mean, LEAST_MEAN), rcond=None)[0]
+        factor = max(1.0 + mean, 0.1)  # on the size, which stands for the mean of the law
+        parts = np.linalg.lstsq(COMPONENTS, (growth - mean) / factor, rcond=None)[0]
         parts = np.clip(parts, -LARGEST, LARGEST)
         values |= dict(zip((p.symbol for p in law.parameters), parts, strict=True))
-        values |= {
-            p.symbol: p.nominal + (values[p.symbol] - p.nominal) * max(1.0 + mean, LEAST_MEAN)
-            for p in law.cause.sizes
-        }
+        sizes = law.cause.sizes
+        values |= {p.symbol: p.nominal + (values[p.symbol] - p.nominal) * factor for p in sizes}
         laws.append(moved)
     hypothesis = replace(estimate.hypothesis, laws=tuple(laws))
     begun = problem.start(hypothesis, values)

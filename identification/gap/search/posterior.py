@@ -22,16 +22,8 @@ POWER = 10.0
 """How many powers of 1 + M/T the likelihood falls by [1]: a cause that leaves 2 T is 60 times less
 probable than one that leaves T."""
 
-CHANCE = 15.0
-"""Misfit that chance leaves, however few the readings [nats]: more parameters fit noise as well."""
-
-TOLERANCE = 2e-3
-"""Misfit that no model is free of [nats per reading]: its root mean square then rises by a fifth of a
-percent, which no estimate of the noise resolves."""
-
-NO_CAUSE, ONE_CAUSE, FURTHER_CAUSE = 0.5, 0.3, 0.1
-"""Probability before the data of no cause and of one cause, and of each further one relative to that:
-most valves have no fault or one."""
+NO_CAUSE = 0.5
+"""Probability before the data of no cause: most valves have no fault or one."""
 
 UNKNOWN_SHARE = 3e-3
 """Share of the recalibrated model's misfit that an unknown cause is taken to leave [1], beside the
@@ -84,8 +76,12 @@ def posterior(
 
 
 def tolerated_misfit(readings: int) -> float:
-    """The misfit that no model is free of [nats]."""
-    return CHANCE + TOLERANCE * readings
+    """The misfit that no model is free of [nats].
+
+    Chance leaves 15, however few the readings, as more parameters fit noise as well. 0.002 per reading
+    raise the root mean square by a fifth of a percent, which no estimate of the noise resolves.
+    """
+    return 15.0 + 2e-3 * readings
 
 
 def log_likelihoods(misfits: NDArray, readings: int) -> NDArray:
@@ -104,7 +100,8 @@ def log_priors(problem: FittingProblem, hypotheses: Sequence[EvaluatedHypothesis
     count = len({cause.name for cause in problem.plant.causes})
     chosen = np.array([*(len(each.labels) for each in hypotheses), min(2, count)])
     sets = gammaln(count + 1) - gammaln(chosen + 1) - gammaln(count - chosen + 1)
-    logs = np.log(ONE_CAUSE) + (chosen - 1) * np.log(FURTHER_CAUSE) - sets
+    # One cause is taken to act in three of ten plants; each further one is ten times rarer.
+    logs = np.log(0.3) + (chosen - 1) * np.log(0.1) - sets
     own = [sum(np.log(c.prior) for c in each.estimate.hypothesis.causes) for each in hypotheses]
     laws = [
         each.law_penalty + len(each.estimate.hypothesis.laws) * np.log(arguments) + each.unusual

@@ -15,10 +15,6 @@ from identification.gap.fit.variable_projection import (
 )
 from identification.gap.plant import Cause
 
-TWIN_CORRELATION = 0.98
-"""Correlation of signatures [1] above which the recordings hardly tell two causes apart; an announcement
-only, no verdict uses it."""
-
 DETECTABLE_SIGNATURE = 3.0
 """Length of a signature [noise deviations] below which the recordings do not show a cause at its usual
 size; an announcement only, except that such a cause resembles no other."""
@@ -90,7 +86,10 @@ class Separability:
         return tuple(label for label, norm in pairs if norm < DETECTABLE_SIGNATURE)
 
     def twins(self, label: str) -> tuple[str, ...]:
-        """Detectable causes that the campaign hardly tells from one cause, the most alike first."""
+        """Detectable causes that the campaign hardly tells from one cause, the most alike first.
+
+        Their signatures correlate above 0.98; an announcement only, no verdict uses it.
+        """
         if label not in self.labels:
             return ()
         row = np.abs(self.correlation[self.labels.index(label)])
@@ -98,7 +97,7 @@ class Separability:
         return tuple(
             self.labels[i]
             for i in order
-            if row[i] > TWIN_CORRELATION
+            if row[i] > 0.98
             and self.labels[i] != label
             and self.signature_norms[i] >= DETECTABLE_SIGNATURE
         )

@@ -68,13 +68,6 @@ def test_another_supply_is_noticed():
         assert_agrees(truth("test1"), by_scipy("test1", reservoir=1.05 * RESERVOIR_VOLUME))
 
 
-def test_at_rest_nothing_moves():
-    true = truth("rest").channels
-    for pressure in ("p1", "p2", "p3"):
-        np.testing.assert_array_equal(true[pressure], TRUE["p_env"])
-    np.testing.assert_array_equal(true["I"], 0.0)
-
-
 @pytest.mark.parametrize("name", ["test1", "hold"])
 def test_with_the_coil_on_the_air_of_the_three_volumes_stays(name):
     """The exhaust is shut: what the reservoirs lose, the circuit and the control chamber gain."""
@@ -104,11 +97,3 @@ def test_without_a_reservoir_the_supply_holds():
     still = run_programme(TRUE, PROGRAMMES["test1"], reservoir=np.inf).channels["p1"]
     np.testing.assert_allclose(still, PROGRAMMES["test1"].p1, rtol=1e-12)
     assert np.ptp(truth("test1").channels["p1"]) > 1000.0
-
-
-def test_another_rate_samples_the_same_course():
-    coarse, fine = truth("test4", 500.0), truth("test4")
-    for channel in ("I", "p1", "p2", "p3"):
-        np.testing.assert_allclose(
-            coarse.channels[channel], fine.channels[channel][::4], rtol=1e-5, atol=1e-6
-        )

@@ -55,17 +55,6 @@ def test_starts_are_the_reference_and_others_spread_evenly_over_the_logarithm():
     )
 
 
-def test_domains_that_hold_zero_are_spread_over_evenly():
-    """kPV's begins at zero and a1's is symmetric about it."""
-    vector = ParameterVector(("kPV", "a1"), START.replace(a1=-0.05))
-    points = starting_points(vector, 41, 0)[1:]
-    low, high = vector.bounds.T
-    assert np.all((low <= points) & (points <= high))
-    np.testing.assert_allclose(
-        np.mean(points, axis=0), 0.5 * (low + high), atol=0.02 * np.max(high - low)
-    )
-
-
 def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
     monkeypatch.setattr(starts, "MOST_EVALUATIONS", 200)
     points = np.array([np.ones(4), BAD_BASIN])

@@ -3,24 +3,22 @@
 import numpy as np
 
 from docs.examples.tank import Tank, virtual_recordings
-from identification.gap.judge.black_box import LearningRun, ridge_on_random_features
+from identification.gap.judge.black_box import ridge_on_random_features
 from identification.gap.judge.held_out import p_value
 
 
-def task(seed: int, wave: float) -> LearningRun:
+def task(seed: int, wave: float) -> tuple[np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     features = rng.standard_normal((400, 4))
     told = wave * np.sin(features[:, 0]) * features[:, 1]
-    return LearningRun(features=features, target=(told + rng.standard_normal(400))[None])
+    return features, (told + rng.standard_normal(400))[:, None]
 
 
 def left(wave: float) -> tuple[float, float]:
     """Mean square of an unseen run, and what is left of it."""
-    unseen = task(9, wave)
-    predicted = ridge_on_random_features([task(seed, wave) for seed in range(4)], [unseen.features], 0)[
-        0
-    ]
-    return float(np.mean(unseen.target**2)), float(np.mean((unseen.target - predicted) ** 2))
+    features, target = task(9, wave)
+    (predicted,) = ridge_on_random_features([task(seed, wave) for seed in range(4)], [features], 0)
+    return float(np.mean(target**2)), float(np.mean((target.T - predicted) ** 2))
 
 
 def test_what_features_tell_is_predicted_on_a_run_never_seen():
@@ -34,9 +32,9 @@ def test_noise_is_left_alone():
 
 
 def test_one_run_is_enough_to_learn_from():
-    unseen = task(9, 5.0)
-    predicted = ridge_on_random_features([task(0, 5.0)], [unseen.features], 0)[0]
-    assert np.mean((unseen.target - predicted) ** 2) < 0.7 * np.mean(unseen.target**2)
+    features, target = task(9, 5.0)
+    (predicted,) = ridge_on_random_features([task(0, 5.0)], [features], 0)
+    assert np.mean((target.T - predicted) ** 2) < 0.7 * np.mean(target**2)
 
 
 def test_a_prediction_of_noise_is_as_good_as_chance_and_of_itself_is_not():

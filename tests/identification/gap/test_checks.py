@@ -12,7 +12,6 @@ from identification.gap.plant import (
     Cause,
     FreeParameter,
     GreyBox,
-    NuisanceParameter,
     PlantError,
     Run,
     StateEquation,
@@ -74,41 +73,24 @@ def with_reading(value: float, trusted: bool) -> Tank:
     return plant
 
 
-def with_nuisance(**sizes: float) -> Tank:
-    """A tank with a spoilt run offset."""
-    return Described(run_offsets=(NuisanceParameter(symbol="zero", **sizes),))
-
-
 def equation(step: float) -> StateEquation:
     """The equation of the level."""
     return StateEquation(name="f1", state="h", component="tank", unit="m/s", step=step)
 
 
-LEVEL, C, LEAK = Described().channels[0], Described().parameters[0], Described().causes[0]
+C, LEAK = Described().parameters[0], Described().causes[0]
 TIME = 0.5 * np.arange(240)
 
 MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
-    "no channels": (lambda: Described(channels=()), "channels: there is none.*give one or more"),
-    "names of channels": (
-        lambda: Described(channels=(LEVEL, LEVEL)),
-        "channels: two are named h.*rename",
-    ),
     "no noise": (
         lambda: with_channel(noise=0.0),
         r"channels, h: noise 0 is not positive.*leave it out",
     ),
-    "resolution": (lambda: with_channel(resolution=-1.0), "channels, h: resolution -1 is no step"),
     "names of runs": (
         lambda: Described(runs=(*runs(True), *runs(False))),
         "runs: two are named test_1.*rename",
     ),
-    "one run": (lambda: Described(runs=runs(True)[:1]), "runs: there is one.*cut in two"),
     "none held out": (lambda: Described(runs=runs(False)), "runs: no run is held out.*held_out=True"),
-    "all held out": (lambda: Described(runs=runs(True)), "runs: no run is fitted.*held_out=False"),
-    "time falls": (
-        lambda: with_run(time=TIME[::-1]),
-        "run test_1: time does not rise uniformly at sample 0",
-    ),
     "time is not uniform": (
         lambda: with_run(time=TIME**1.1),
         "run test_1: time does not rise uniformly.*resample",
@@ -116,10 +98,6 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
     "time jumps": (
         lambda: with_run(time=TIME + 3.0 * (TIME >= 50.0)),
         "run test_1: time jumps by 3.5 s at sample 100, where the period is 0.5 s: cut",
-    ),
-    "time is lost": (
-        lambda: with_run(time=np.where(TIME == 50.0, np.nan, TIME)),
-        "run test_1: time does not rise uniformly",
     ),
     "readings": (
         lambda: with_run(measured=np.zeros(240)),
@@ -133,25 +111,17 @@ MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
     "inputs": (lambda: with_run(inputs={"q": np.zeros(3)}), r"test_1: input q has the shape \(3,\)"),
     "range": (lambda: with_c(low=0.2), "parameters, c: low 0.2 and high 0.1 are no range"),
     "nominal": (lambda: with_c(nominal=0.5), "parameters, c: nominal 0.5 lies outside 0.001 to 0.1"),
-    "scale": (lambda: with_c(scale=0.0), "parameters, c: scale 0 is not positive.*leave it out"),
     "nothing to fit": (
         lambda: Described(parameters=(), causes=()),
         "parameters, causes: both are empty",
     ),
     "symbol of a cause": (lambda: with_cause(symbol="c"), "causes, leak: c is a parameter"),
-    "symbol of two causes": (lambda: with_cause(symbol="lag"), "causes, leak and lag: both have lag"),
-    "nominal is nuisance": (
-        lambda: Described(tolerances=(NuisanceParameter(symbol="c", sd=1.0, step=1.0),)),
-        "tolerances, c: it is one of `parameters` as well",
-    ),
     "no size": (
         lambda: Described(causes=(replace(LEAK, parameters=()),)),
         "causes, leak: it has no parameters",
     ),
     "no trials": (lambda: with_cause(trials=()), "causes, leak, leak: it has no trials"),
-    "trial is nominal": (lambda: with_cause(trials=(0.0,)), "leak: trial 0 is the nominal value"),
     "trial out of range": (lambda: with_cause(trials=(9.0,)), "leak: trial 9 lies outside 0 to 0.05"),
-    "nuisance sd": (lambda: with_nuisance(sd=0.0, step=1.0), "run_offsets, zero: sd 0 is not positive"),
     "forcing": (lambda: Described(equations=(equation(-1.0),)), "equations, f1: step -1 is negative"),
 }
 

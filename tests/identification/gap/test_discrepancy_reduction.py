@@ -87,16 +87,6 @@ def test_the_gap_is_that_of_known_noise_and_misfit():
     assert gap.value == pytest.approx(np.sqrt(1 + 9), rel=0.12)
 
 
-def test_percent_is_eq_19():
-    tank = Tank(virtual_recordings({}))
-    scaled = [1.02 * run.measured for run in tank.runs]
-    mean = np.mean(tank.runs[2].measured)
-    rms = np.sqrt(np.mean(tank.runs[2].measured ** 2))
-    found = percentage_errors(tank, scaled)
-    assert found is not None
-    assert found["overall"] == found["h"] == pytest.approx(2 * rms / mean, rel=0.01)
-
-
 @pytest.mark.parametrize(
     ("offset", "amplitude", "has_percent"),
     [

@@ -70,7 +70,6 @@ def diagnosed() -> Diagnosis:
     return diagnose(swing(runs, mode="compiled"))
 
 
-@pytest.mark.slow
 def test_a_strength_that_follows_a_state_is_found():
     ranking, best = diagnosed().ranking, diagnosed().ranking.hypotheses[0]
     assert (diagnosed().conclusion.verdict, best.labels) == (KNOWN, ("drag",))
@@ -95,21 +94,19 @@ def left(name: str, opened: bool) -> float:
     return misfit_beyond_noise(evaluate(problem, [fitted])[0], ranking.noise)
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize(("name", "opened"), [("drag", False), ("dry", True), ("hard", True)])
 def test_another_law_or_cause_leaves_far_more(name, opened):
     tolerated = tolerated_misfit(sum(own.readings for own in diagnosed().ranking.noise))
     assert left(name, opened) > 10 * (left("drag", True) + tolerated)
 
 
-@pytest.mark.slow
 def test_the_law_is_said_drawn_and_written():
     found, best = diagnosed(), diagnosed().ranking.hypotheses[0]
     ((law, components),) = best.estimate.laws
     growth = law.growth(components)
     words = in_words(best.estimate.laws)
     assert words.startswith(f"the strength of drag follows s: {growth[0]:+.0%} at its least value")
-    assert f"The law differs from the one assumed: {words}." in verdict_sentence(found, "")[1]
+    assert f"The law differs from the one assumed: {words}." in verdict_sentence(found)[1]
     ends = {"effect": "drag", "argument": "s", "low": law.low, "high": law.high}
     assert as_json(found)["causes"][0]["laws"] == [ends | {"growth": growth.tolist()}]
     assert len(drawn_laws(found, best)) == 1

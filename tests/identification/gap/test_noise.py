@@ -15,7 +15,6 @@ from identification.gap.prepare.noise import (
     ChannelNoise,
     autocovariance,
     residual_noise,
-    white_variance,
 )
 from identification.readings_noise import white_noise
 
@@ -113,18 +112,3 @@ def test_chance_in_few_readings_is_neither_ripple_nor_discrepancy():
     rng = np.random.default_rng(0)
     found = [seen([rng.standard_normal(300)]) for _ in range(200)]
     assert np.mean([each.sd > 0.0 or bool(each.ripple) for each in found]) < 0.01
-
-
-@pytest.mark.parametrize("share", [0.2, 0.3, 0.9, 1.0])
-def test_the_white_variance_of_an_exact_covariance(share):
-    """A white part and a geometric one, whose sum is 1."""
-    covariance = (1.0 - share) * 0.8 ** np.arange(10.0)
-    covariance[0] += share
-    assert white_variance(covariance) == pytest.approx(share, abs=1e-9)
-
-
-def test_a_faint_but_long_correlation_lowers_what_readings_tell():
-    """Of a hundred readings, in a twentieth of the variance."""
-    independent = 1.0 + 0.05 / 1.05 * 200.0
-    found = seen(rippled(0, np.sqrt(0.05), np.exp(-0.01), 40_000)).correlated
-    assert 0.4 * independent < found < 1.2 * independent

@@ -53,11 +53,6 @@ def test_noise_is_seen_beside_motion(samples, period, accuracy):
     assert plant.channels[0].noise == pytest.approx(SIGMA, rel=accuracy)
 
 
-def test_jumps_do_not_count_as_noise():
-    readings = noisy(2000, 400.0) + 5.0 * (np.arange(2000) // 100)
-    assert recorded(readings).channels[0].noise == pytest.approx(SIGMA, rel=0.1)
-
-
 def test_neighbours_of_a_slow_channel_are_its_trusted_readings():
     readings, trusted = np.full(10_000, np.nan), np.zeros(10_000, bool)
     trusted[::10] = True
@@ -66,12 +61,6 @@ def test_neighbours_of_a_slow_channel_are_its_trusted_readings():
     assert plant.channels[0].noise == pytest.approx(SIGMA, rel=0.1)
     np.testing.assert_array_equal(plant.runs[0].measured[0, ::10], readings[::10])
     assert np.all(np.isfinite(plant.runs[0].measured))
-
-
-def test_coarse_steps_leave_at_least_the_error_of_rounding():
-    coarse = 0.05 * np.round(np.sin(np.arange(20_000) / 900.0) / 0.05)
-    plant = recorded(coarse)
-    assert plant.channels[0].noise == pytest.approx(0.05 / np.sqrt(12), rel=1e-6)
 
 
 def test_constant_readings_ask_for_the_noise():

@@ -8,10 +8,7 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
-from identification.gap.fit.recalibration import with_ripple
 from identification.gap.judge.verdict import KNOWN_GAP, PARTIAL, UNKNOWN, Ranking
-from identification.gap.plant import Ripple
-from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.report.sentences import verdict_sentence
 from tests.identification.gap.drives import Drive
 from tests.identification.gap.tanks import disturbed, leaking, without_gap
@@ -63,11 +60,6 @@ def test_a_wrongly_stated_noise_changes_no_judgement(tank, factor):
     assert wrong.hypotheses[0].labels == right.hypotheses[0].labels
 
 
-def test_the_same_recordings_give_the_same_verdict():
-    one, other = (rank_hypotheses(Tank(virtual_recordings({"leak": 2e-3}))) for _ in range(2))
-    assert one.probabilities == other.probabilities
-
-
 NEARLY_ALL, A_PART = (0.9, 0.01), (0.3, 0.02)
 """Coupling, and a lag that the catalogue lacks: of which the coupling closes nearly all of the gap, and
 two thirds."""
@@ -84,9 +76,9 @@ def test_a_true_cause_that_leaves_a_little_is_held():
     assert found.conclusion.held == ("coupling",)
     assert 0.9 < found.reduction.shares_closed["coupling"].value < 1.0
     assert found.reduction.left.overall.value > KNOWN_GAP
-    text = verdict_sentence(found, "")[1]
+    text = verdict_sentence(found)[1]
     assert text.startswith("coupling is part of the gap (")
-    assert text.endswith("add coupling.")
+    assert "Add coupling." in text
 
 
 def test_a_true_cause_that_leaves_much_is_to_be_added_but_not_named():
@@ -96,7 +88,7 @@ def test_a_true_cause_that_leaves_much_is_to_be_added_but_not_named():
     assert 0.5 < found.reduction.shares_closed["coupling"].value < 0.9
     assert found.advised
     assert "coupling" in found.advised.effects
-    text = verdict_sentence(found, "")[1]
+    text = verdict_sentence(found)[1]
     assert "all the same: it closes" in text
     assert "do not add" not in text
 
@@ -107,11 +99,3 @@ def test_what_remains_is_located(sizes):
     found = beside_a_lag(*sizes)
     assert found.remaining is not None
     assert max(found.remaining.equation_probabilities.values()) > 0.5
-
-
-def test_what_the_inputs_foresee_is_no_ripple():
-    ranking = beside_a_lag(*A_PART).ranking
-    plant = prepared(ranking.problem.plant)
-    noise = [replace(own, ripple=Ripple.of(1.0, 1.0, 0.9)) for own in ranking.noise]
-    assert with_ripple(plant, noise, [0.5] * len(noise)) is plant
-    assert all(with_ripple(plant, noise, [0.0] * len(noise)).ripples)

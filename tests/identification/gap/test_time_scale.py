@@ -80,13 +80,6 @@ def test_a_wrong_noise_hardly_moves_it(factor):
     assert course.scale / 2 < found < 2 * course.scale
 
 
-def test_as_much_noise_as_signal_makes_a_slow_plant_not_fast():
-    course = COURSES["lag"]
-    readings = course.values + 0.7 * np.random.default_rng(1).standard_normal(len(course.values))
-    found = time_scale(recorded(readings, period=course.period, noise=0.7))
-    assert 0.3 * course.scale < found < 5 * course.scale  # a step lasts 5
-
-
 def test_a_channel_read_at_every_tenth_sample_has_the_same_time_scale():
     course = COURSES["lag"]
     trusted = np.zeros((1, len(course.values)), dtype=bool)
@@ -94,11 +87,6 @@ def test_a_channel_read_at_every_tenth_sample_has_the_same_time_scale():
     readings = np.where(trusted[0], course.values, np.nan)
     found = time_scale(recorded(readings, period=course.period, noise=1e-4, trusted=trusted))
     assert found == pytest.approx(course.scale, rel=0.3)
-
-
-def test_it_is_at_least_a_sampling_period():
-    alternating = np.where(np.arange(200) % 2, 1.0, -1.0)
-    assert time_scale(recorded(alternating, period=0.5, noise=1e-3)) >= 0.5
 
 
 @pytest.mark.parametrize("noise", [0.0, 1.0])

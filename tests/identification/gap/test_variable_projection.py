@@ -10,10 +10,7 @@ from identification.gap.fit.variable_projection import (
     LARGEST_DEVIATION,
     LinearisedRun,
     bounded_minimiser,
-    equations_of,
     normal_equations,
-    products_of,
-    without_run_nuisances,
 )
 
 RNG = np.random.default_rng(2)
@@ -64,41 +61,6 @@ def test_the_reduced_equations_have_the_whole_problem_s_solution():
     assert left == pytest.approx(squares[0], rel=1e-9)
 
 
-@pytest.mark.parametrize("kept", [0, 1])
-def test_the_products_of_some_columns_are_those_of_a_smaller_problem(kept):
-    given = runs()
-    fewer = [
-        replace(
-            run,
-            slopes=run.slopes[:, [kept]],
-            slope_precision=PRECISION[[kept]],
-            slope_values=VALUES[[kept]],
-        )
-        for run in given
-    ]
-    expected, columns = normal_equations(fewer), np.array([0, 1 + kept, 3, 4, 5])
-    # Values apart from the prior's mean count in both: only the slope left out loses its own.
-    found = equations_of(products_of(given).of(columns), 1)
-    lost = PRECISION[1 - kept] * VALUES[1 - kept] ** 2
-    assert found.hessian == pytest.approx(expected.hessian)
-    assert found.gradient == pytest.approx(expected.gradient)
-    assert found.chi_square - lost == pytest.approx(expected.chi_square)
-
-
-def test_residuals_without_nuisances_are_what_the_whole_problem_leaves():
-    given = runs()
-    at_rest = [replace(run, slopes=np.zeros((40, 2))) for run in given]
-    found = normal_equations(at_rest)
-    matrix, right = one_problem(given)
-    solution = np.linalg.lstsq(matrix[:, 2:], right, rcond=None)[0]
-    np.testing.assert_allclose(found.shared, solution[:3], rtol=1e-9)
-    for r, run in enumerate(given):
-        residual, step = without_run_nuisances(run, found.shared)
-        np.testing.assert_allclose(step, solution[3 + 2 * r : 5 + 2 * r], rtol=1e-9)
-        expected = run.residual - run.shared_slopes @ solution[:3] - run.run_slopes @ step
-        np.testing.assert_allclose(residual, expected, rtol=1e-9)
-
-
 def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
     given = [replace(run, residual=200.0 * run.residual) for run in runs()]
     found = normal_equations(given)
@@ -115,12 +77,6 @@ def test_a_bounded_step_is_that_of_the_whole_bounded_problem():
     assert found.chi_square > found.least
 
 
-def test_a_number_of_a_run_stays_within_its_bounds():
-    run = replace(runs(1)[0], run_values=np.zeros(2), run_sd=np.array([1e-3, 2.0]))
-    _, step = without_run_nuisances(run, np.zeros(3))
-    assert abs(step[0]) <= LARGEST_DEVIATION * 1e-3
-
-
 def problem(seed: int, n: int = 12) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     rng = np.random.default_rng(seed)
     columns = rng.normal(size=(40, n)) @ rng.normal(size=(n, n))
@@ -135,21 +91,3 @@ def test_it_is_the_bounded_minimiser(seed):
     reference = lsq_linear(columns, target, (low, high), method="bvls", tol=1e-14).x
     assert np.any((found == low) | (found == high))
     assert found == pytest.approx(reference, abs=1e-7)
-
-
-def test_a_number_without_a_range_stays():
-    columns, target, low, high = problem(3)
-    low[[0, 4]] = high[[0, 4]] = 0.0
-    found = bounded_minimiser(columns.T @ columns, columns.T @ target, low, high)
-    assert found[0] == found[4] == 0.0
-
-
-def test_equal_columns_share_what_they_explain():
-    columns, target, low, high = problem(5, n=3)
-    columns = np.column_stack([columns, columns[:, 0]])
-    low, high = np.append(low, -9.0), np.append(high, 9.0)
-    found = bounded_minimiser(columns.T @ columns, columns.T @ target, low, high)
-    reference = lsq_linear(columns, target, (low, high), method="bvls", tol=1e-14)
-    left = columns @ found - target
-    assert left @ left == pytest.approx(2.0 * reference.cost, rel=1e-6)
-    assert np.all((low <= found) & (found <= high))

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from identification.block_bootstrap import Interval
+from identification.gap.diagnosis import Diagnosis
 from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.fitting_problem import Hypothesis
 from identification.gap.judge.held_out import DiscrepancyReduction
@@ -34,13 +35,16 @@ LAG = Cause(name="lag", component="sensor", parameters=())
 FAST, SLOW = (Cause(name="lag", component="sensor", parameters=(), variant=v) for v in ("fast", "slow"))
 
 
-SOUND = diagnosed("no_gap")
+def sound() -> Diagnosis:
+    """A diagnosis without a gap, whose parts are replaced."""
+    return diagnosed("no_gap")
+
 
 BOTH_OR_ONE = [("leak", "lag"), ("leak",)]
 
 
 def evaluated(*causes: Cause) -> EvaluatedHypothesis:
-    recalibrated = SOUND.ranking.recalibrated
+    recalibrated = sound().ranking.recalibrated
     estimate = replace(recalibrated.estimate, hypothesis=Hypothesis(causes=causes))
     return replace(recalibrated, estimate=estimate)
 
@@ -48,7 +52,7 @@ def evaluated(*causes: Cause) -> EvaluatedHypothesis:
 def ranking(found: list[tuple[tuple[Cause, ...], float]], no_cause=0.0, unknown=0.0) -> Ranking:
     """Hypotheses with their probabilities."""
     return replace(
-        SOUND.ranking,
+        sound().ranking,
         hypotheses=[evaluated(*causes) for causes, _ in found],
         probabilities=[probability for _, probability in found],
         no_cause=no_cause,
@@ -58,13 +62,13 @@ def ranking(found: list[tuple[tuple[Cause, ...], float]], no_cause=0.0, unknown=
 
 def leaving(gap: float, predictable: bool = False) -> DiscrepancyReduction:
     """Every model leaves a gap [noise deviations] on held-out recordings."""
-    left = replace(SOUND.reduction.unexplained, still_predictable=predictable)
+    left = replace(sound().reduction.unexplained, still_predictable=predictable)
     whole = Interval(value=gap, low=gap, high=gap)
     return replace(
-        SOUND.reduction,
+        sound().reduction,
         unexplained=left,
         recalibration_leaves=left,
-        gaps={label: replace(each, overall=whole) for label, each in SOUND.reduction.gaps.items()},
+        gaps={label: replace(each, overall=whole) for label, each in sound().reduction.gaps.items()},
     )
 
 
@@ -81,7 +85,7 @@ def localisation(**shares: float) -> Localisation:
     ]  # fmt: skip
     equations = {f"d{component}": share for component, share in shares.items()}
     return replace(
-        SOUND.localisation,
+        sound().localisation,
         equation_probabilities=equations,
         nothing_missing=1.0 - sum(shares.values()),
         forcings=forcings,

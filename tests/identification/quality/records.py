@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.studies.reproduction.noise_errata import TREND_OFFSETS
+from docs.studies.reproduction.errata import TREND_OFFSETS
 from epv_env.plant.channels import SENSORS
 from identification.recordings.recording import CHANNELS, UNITS, Recording
 

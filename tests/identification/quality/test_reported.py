@@ -4,15 +4,13 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from docs.studies.reproduction.noise_errata import (
-    CORRELATIONS,
+from docs.studies.reproduction.errata import (
     SAMPLES,
     STATISTICS,
     TREND_OFFSETS,
     TREND_SLOPES,
 )
 from epv_env.plant.channels import SENSORS
-from identification.quality.assessment import white_noise_band
 from identification.recordings.recording import CHANNELS
 
 
@@ -29,14 +27,6 @@ def test_trends_are_insignificant_and_offsets_small():
         assert abs(offset) < 0.029 * sensor.accuracy * sensor.high
 
 
-def test_seven_of_ten_correlations_leave_the_band_and_five_are_significant():
-    values = np.abs(list(CORRELATIONS.values()))
-    raw = 2 * stats.norm.sf(values * np.sqrt(SAMPLES))
-    assert np.sum(values > white_noise_band(SAMPLES)) == 7
-    assert np.sum(len(raw) * raw < 0.05) == 5
-    assert np.max(values**2) == pytest.approx(0.005, abs=1e-4)
-
-
 def test_outlier_factors_are_what_chance_makes_them_or_less():
     p3, step = STATISTICS["p3"], SENSORS["p3"].resolution
     assert chance_of_staying_below(4.0) == pytest.approx(0.53, abs=0.005)
@@ -49,12 +39,3 @@ def test_outlier_factors_are_what_chance_makes_them_or_less():
 def test_kurtosis_lies_below_that_of_normal_noise(name, errors):
     values = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / SAMPLES)
     assert values == pytest.approx(errors, abs=0.06)
-
-
-@pytest.mark.parametrize(
-    ("name", "excess"), [("I", 1.0), ("U", -1.4), ("p1", -0.2), ("p2", 0.0), ("p3", 0.4)]
-)
-def test_signal_to_noise_ratios_against_equation_17(name, excess):
-    values = STATISTICS[name]
-    expected = 20 * np.log10(SENSORS[name].high / values.standard_deviation)
-    assert values.signal_to_noise - expected == pytest.approx(excess, abs=0.06)

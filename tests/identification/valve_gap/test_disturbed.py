@@ -16,8 +16,6 @@ from identification.valve_gap.valve import Valve
 from tests.identification.disturbances import add_ripple, round_pressures
 from tests.identification.valve_gap.small_catalogue import LEFT_OUT
 
-pytestmark = pytest.mark.slow
-
 RIPPLE = {name: 2.0 * SENSORS[name].noise for name in ("p1", "p2", "p3")}
 """Twice the sensors' noise."""
 

@@ -63,8 +63,8 @@ def test_a_separation_is_what_the_bench_then_measures():
     ("programmes", "probabilities", "verdict", "text"),
     [
         ([BLINK, OPENING], (0.6, 0.4), AMBIGUOUS, "Record one opening of 120 ms from 9 bar supply"),
-        ([BLINK], (0.6, 0.4), AMBIGUOUS, "No candidate tells"),
-        ([BLINK, OPENING], (0.01, 0.96), NO_GAP, "None is needed (no cause: 96 %); one opening of 120"),
+        ([BLINK], (0.6, 0.4), AMBIGUOUS, "No programme of the bench tells"),
+        ([BLINK, OPENING], (0.01, 0.96), NO_GAP, "No further recording is needed (no cause: 96 %)."),
         ([BLINK], (0.2, 0.1), UNKNOWN, "No cause of the catalogue explains the recordings"),
     ],
 )

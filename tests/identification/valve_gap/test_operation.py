@@ -19,31 +19,16 @@ from identification.recordings.log_files import read_log
 from identification.recordings.openings import drive_of, openings, start_of
 from identification.recordings.recording import CampaignError
 from identification.valve_gap.operation import LoggedValve, steady_openings
+from training.drives import write_log
 
 PLANT = Plant.calibrated()
 
 
-def drive(folder, effects=(), drives=2, seconds=6, scenario="service"):
-    """A log under the package's policy; effects: of each drive."""
-    make = {"scenario": scenario, "max_episode_steps": round(seconds / 0.005)}
-    env = OperationLog(gymnasium.make("EPValve-v0", **make), folder)
-    policy = load_policy()
-    for number in range(drives):
-        own = effects[number] if effects else {}
-        observation, _ = env.reset(seed=number, options={"effects": own})
-        policy.reset(1)
-        ended = False
-        while not ended:
-            action = policy.act(observation[None])[0]
-            observation, _, terminated, truncated, _ = env.step(int(action))
-            ended = terminated or truncated
-    env.close()
-    return folder
-
-
 @pytest.fixture(scope="module")
 def healthy(tmp_path_factory):
-    return drive(tmp_path_factory.mktemp("logs") / "valve", seconds=10)
+    folder = tmp_path_factory.mktemp("logs") / "valve"
+    write_log(folder, load_policy(), PLANT, range(2), duration=10.0, scenario="service")
+    return folder
 
 
 def test_a_log_holds_what_the_controller_read(healthy):
@@ -99,10 +84,12 @@ def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
         assert np.all(run.trusted[0] == (~doubted if run.name in steady else False))
 
 
-@pytest.mark.slow
 def test_cause_and_onset_are_found(tmp_path):
     eddy = {"eddy_current": {"G_eddy": 0.004}}
-    folder = drive(tmp_path / "log", [{}, eddy, eddy], drives=3, seconds=20, scenario="steps")
+    folder = tmp_path / "log"
+    write_log(
+        folder, load_policy(), PLANT, range(3), duration=20.0, scenario="steps", effects=eddy, onset=1
+    )
     assert main(["gap", str(folder), "--logs", "--out", str(tmp_path / "out")]) == 0
     content = json.loads((tmp_path / "out" / "gap.json").read_text())
     assert content["causes"][0]["effects"] == ["eddy_current"]

@@ -32,8 +32,3 @@ def test_every_run_finds_its_own_warmth():
     held_out = [run.held_out for run in Valve(campaign()).runs]
     assert set(held_out) == {False, True}
     assert found() == pytest.approx(WARM, rel=0.01)
-
-
-def test_one_linear_step_does_not(monkeypatch):
-    monkeypatch.setattr(prediction, "SETTLING_STEPS", 1)
-    assert np.max(np.abs(found() - WARM)) > 0.02 * WARM

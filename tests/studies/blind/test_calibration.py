@@ -7,9 +7,7 @@ from docs.studies.blind.score import (
     FIRST,
     INCLUSION,
     answers,
-    calibration_error,
     expected_calibration_error,
-    reliability,
     score_trial,
 )
 from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
@@ -26,11 +24,6 @@ def test_a_calibrated_judge_has_hardly_an_error():
     assert error(p, rng.uniform(size=p.size) < p) < 0.02
 
 
-def test_answers_as_often_right_as_they_say_have_no_error():
-    """Of ten at 0.7 seven are right, of five at 0.2 one."""
-    assert error([0.7] * 10 + [0.2] * 5, [1] * 7 + [0] * 3 + [1] + [0] * 4) == pytest.approx(0.0)
-
-
 def test_an_overconfident_judge_has_the_error_that_hands_compute():
     """Of 39 answers at 0.995, 33 are right; of 16 at 0.91, 13: both lie in the topmost bin.
 
@@ -40,23 +33,6 @@ def test_an_overconfident_judge_has_the_error_that_hands_compute():
     assert sure == pytest.approx((53.365 - 46) / 55)
     mixed = error([0.95] * 10 + [0.55] * 10, [1] * 8 + [0] * 2 + [1] * 9 + [0])
     assert mixed == pytest.approx((1.5 + 3.5) / 20)
-
-
-def test_the_interval_holds_the_error():
-    rng = np.random.default_rng(1)
-    p = rng.uniform(0.5, 1.0, 60)
-    found = calibration_error(p, rng.uniform(size=60) < p - 0.3)
-    assert found["low"] < found["value"] < found["high"]
-    assert calibration_error(np.zeros(0), np.zeros(0)) == {"value": None}
-
-
-def test_a_reliability_bin_has_its_mean_and_its_share():
-    (bin_,) = reliability(np.array([0.82, 0.88, 0.86]), np.array([1, 1, 0]))
-    assert bin_["probability"] == pytest.approx(0.8533, abs=1e-4)
-    assert (bin_["right"]["hits"], bin_["right"]["of"]) == (2, 3)
-    bins = reliability(np.array([0.0, 0.1, 0.99, 1.0]), np.zeros(4))
-    assert [b["right"]["of"] for b in bins] == [1, 1, 2]
-    assert reliability(np.zeros(0), np.zeros(0)) == []
 
 
 def test_a_named_cause_is_wrong_where_none_is_right_and_faint_inclusions_are_left_out():

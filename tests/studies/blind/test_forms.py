@@ -4,27 +4,24 @@ import numpy as np
 import pytest
 
 from docs.studies.blind.forms import (
-    INSTANT_DROP,
     LANGEVIN,
     OTHER_FORMS,
-    langevin,
     langevin_force,
     langevin_slope,
-    level_of_force,
     right_hand_side,
 )
 from docs.studies.blind.truth import EFFECTS, top_sizes
 from epv_env.plant.coefficients import coefficients
-from epv_env.plant.effects.magnet import saturated_force
 from epv_env.plant.effects.registry import EFFECTS as RECORDS
 from epv_env.plant.effects.registry import effect, effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 
+pytestmark = pytest.mark.slow
+
 PLANT = COMPILED_RIGHT_HAND_SIDES[True]
-DROP, CURRENT = (State._fields.index(name) for name in ("supply_drop", "I"))
-LEVELS = (1e-3, 0.02, 0.03, 0.2, 1.0, 3.0)
+CURRENT = State._fields.index("I")
 BESIDE_THE_STATE = {
     "pressure_sensor_bias", "pressure_sensor_gain", "current_sensor_gain", "command_delay",
 }  # fmt: skip
@@ -76,13 +73,6 @@ def test_without_deviation_the_forms_are_the_plant_s():
     )
 
 
-def test_without_effects_there_is_nothing_to_deviate():
-    p = Parameters.calibrated()
-    np.testing.assert_array_equal(
-        all_rates(right_hand_side(0.15), p), all_rates(right_hand_side(0.0), p)
-    )
-
-
 def test_each_effect_deviates_and_by_a_part_of_itself():
     """The deviation moves the rates less than the effect does, where the effect moves them."""
     off = all_rates(right_hand_side(0.0), Parameters.calibrated())
@@ -117,47 +107,6 @@ def test_the_other_form_is_the_plant_without_the_effect_and_another_with_it(name
     np.testing.assert_allclose(rates(other, p, state()), rates(PLANT, p, state()), rtol=1e-12)
     found, fitted = (rates(function, top(name), state()) for function in (other, PLANT))
     assert np.max(np.abs(found - fitted) / np.maximum(np.abs(fitted), 1e-9)) > 0.01
-
-
-def test_an_instant_drop_is_the_plant_s_once_that_has_settled():
-    """The plant's own drop, run to rest at this flow, gives the rates of the instant one."""
-    p = top(INSTANT_DROP)
-    instant = rates(right_hand_side(0.0, [INSTANT_DROP]), p, state())
-    low, high = 0.0, state().p1 / 3
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        falls = rates(PLANT, p, state(supply_drop=middle))[DROP] < 0
-        low, high = (low, middle) if falls else (middle, high)
-    assert low > 1e4
-    settled = rates(PLANT, p, state(supply_drop=low))
-    settled[DROP] = 0.0
-    np.testing.assert_allclose(instant, settled, rtol=1e-9)
-
-
-def test_a_flow_back_has_no_instant_drop():
-    function = right_hand_side(0.3, [INSTANT_DROP])
-    back = state(p1=5e5, p2=6e5, p3=6e5)
-    np.testing.assert_allclose(
-        rates(function, top(INSTANT_DROP), back),
-        rates(right_hand_side(0.3), Parameters.calibrated(), back),
-        rtol=1e-12,
-    )
-
-
-@pytest.mark.parametrize("u", LEVELS)
-def test_slope_and_force_are_derivatives_of_flux_and_coenergy(u):
-    """With k = N I sMV and u = k/Rm: flux L(3u), force d(Rm G(u))/d(-Rm), G the flux's integral."""
-    h = 1e-4 * u
-    levels = np.linspace(0.0, u + h, 20001)[1:]
-    flux = np.array([langevin(3 * level) for level in (u - h, u + h)])
-    assert langevin_slope(u) == pytest.approx((flux[1] - flux[0]) / (2 * h), rel=1e-4)
-    curve = np.concatenate([[0.0], 1 / np.tanh(3 * levels) - 1 / (3 * levels)])
-    at = np.concatenate([[0.0], levels])
-    coenergy = np.interp(
-        u, at, np.concatenate([[0.0], np.cumsum(np.diff(at) * (curve[1:] + curve[:-1]) / 2)])
-    )
-    assert langevin_force(u) == pytest.approx((u * langevin(3 * u) - coenergy) / u**2, rel=1e-3)
-    assert saturated_force(level_of_force(u)) == pytest.approx(langevin_force(u), rel=1e-9)
 
 
 def test_the_armature_s_force_and_the_current_s_rate_are_those_of_the_langevin_curve():

@@ -1,25 +1,15 @@
 """Scores of labels and answers made by hand, whose counts are known."""
 
-import json
-
 import pytest
 
 from docs.studies.blind.score import (
-    FIRST,
-    INCLUSION,
-    answers,
     figures,
-    held_effects,
     is_correct,
     is_tied,
-    is_true,
-    named_cause,
-    named_set,
-    reliability,
     score_trial,
     share,
 )
-from docs.studies.blind.study import AT_LEAST, AT_MOST, reliability_figure, rows
+from docs.studies.blind.study import AT_LEAST, AT_MOST, rows
 from docs.studies.blind.truth import ABSORBED
 from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
 
@@ -63,24 +53,11 @@ def test_the_order_of_a_pair_does_not_matter_and_a_hidden_effect_need_not_be_nam
     assert not is_correct(hidden, ["seat_leak", "flow_force"])
 
 
-def test_effects_are_held_from_nine_tenths_the_surest_first():
-    said = partial(eddy_current=0.9, flow_force=0.95, seat_leak=0.899)
-    assert held_effects(said) == named_cause(said) == ("flow_force", "eddy_current")
-
-
 def test_partial_is_right_if_what_it_holds_is_the_truth():
     whole = score_trial(PAIR, partial(eddy_current=0.99, flyback_voltage=0.92))
     assert (whole["named"], whole["named_right"], whole["truth_in_set"]) == (BOTH, True, True)
     half = score_trial(PAIR, partial(eddy_current=0.99, flyback_voltage=0.6))
     assert (half["named"], half["named_right"]) == (["eddy_current"], False)
-
-
-def test_an_ambiguity_set_of_a_partial_counts_as_it_is_given():
-    given = partial(eddy_current=0.99) | {"ambiguity_set": [BOTH, ["eddy_current"]]}
-    assert named_set(given) == [tuple(BOTH), ("eddy_current",)]
-    assert named_set(partial(eddy_current=0.99)) == [("eddy_current",)]
-    assert named_set(partial(eddy_current=0.5)) == []
-    assert named_set(answer("unknown", EDDY)) == []
 
 
 @pytest.mark.parametrize(("second", "tied"), [(0.4005, True), (0.398, False)])
@@ -89,21 +66,6 @@ def test_a_first_cause_within_a_thousandth_of_the_next_is_tied_and_counts_as_wro
     assert is_tied(label(), said) is tied
     counted = counts([score_trial(label(), said)])
     assert counted["First cause right (a tie counts as wrong)"] == (int(not tied), 1)
-
-
-def test_two_right_causes_do_not_tie():
-    hidden = label("pair", BOTH, visible=["eddy_current"])
-    said = answer("ambiguous", (["eddy_current"], 0.45), (BOTH, 0.45), named=2)
-    assert not is_tied(hidden, said)
-    assert is_tied(label(), said)
-
-
-def test_an_absorbed_effect_that_is_named_is_true_though_there_was_nothing_to_explain():
-    absorbed = label("pair", BOTH, visible=[])
-    assert is_true(absorbed, ["eddy_current"])
-    assert not is_true(absorbed, ["flow_force"])
-    assert not is_true(absorbed, [])
-    assert not is_true(NOTHING, ["eddy_current"])
 
 
 def test_without_effect_any_verdict_but_no_gap_is_a_false_alarm():
@@ -157,12 +119,3 @@ def test_shares_means_and_what_is_asked_of_a_study():
     assert cells["False alarms without an effect"] == ("0 of 0: - (0 to 1)", "at most 0")
     assert (AT_LEAST | AT_MOST).keys() <= cells.keys()
     assert dict(zip(cells, rows(found, "strong"), strict=True))["Component right"][2] == "at least 0.95"
-
-
-def test_the_results_are_ready_for_json_and_the_picture_shows_both_statements():
-    trials = [*study(), score_trial(NOTHING, answer("no_gap", component="")), score_trial(label(), None)]
-    json.dumps([trials, figures(trials)], allow_nan=False)
-    bins = {name: reliability(*answers(trials, name)) for name in (FIRST, INCLUSION)}
-    assert [axes.get_title() for axes in reliability_figure(bins).axes] == [
-        "first cause", "inclusion of an effect",
-    ]  # fmt: skip

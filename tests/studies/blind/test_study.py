@@ -2,6 +2,8 @@
 
 import hashlib
 import json
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import pytest
 
@@ -10,6 +12,8 @@ from docs.studies.blind.study import COMMITMENTS, LABEL, QUICK_SUITE, generate_t
 from docs.studies.blind.truth import trial_plan
 from epv_env.common.files import write_text
 from identification.recordings.campaign_files import read_campaign
+
+pytestmark = pytest.mark.slow
 
 N, SEED = 2, 162
 """The first trial has no effect, the second one an effect that the diagnosis lacks."""
@@ -27,19 +31,32 @@ def fails(campaign, out, **told):
     raise RuntimeError("it did not converge")
 
 
-def check(out, diagnosis=says_no_gap):
-    """Run the study on few recordings, in this process."""
+@contextmanager
+def stub(diagnosis) -> Iterator[None]:
+    """The study in this process, with another diagnosis."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(study, "diagnose_campaign", diagnosis)
         patch.setattr(study, "in_processes", lambda f, jobs, what: [f(*job) for job in jobs])
-        return study.scores(out, trials=N, seed=SEED, forms="usual", suite=QUICK_SUITE)
+        yield
+
+
+def check(folder, diagnosis=says_no_gap):
+    with stub(diagnosis):
+        return study.scores(folder, trials=N, seed=SEED, forms="usual", suite=QUICK_SUITE)
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory):
+def out(tmp_path_factory):
+    """Results of the short form."""
     out = tmp_path_factory.mktemp("blind")
-    check(out)
+    with stub(says_no_gap):
+        assert main(["--quick", "--seed", str(SEED), "--out", str(out)]) == 0
     return out
+
+
+@pytest.fixture
+def folder(out):
+    return out / f"usual-{SEED}"
 
 
 def trials(folder):
@@ -113,10 +130,8 @@ def test_a_changed_truth_is_refused(folder):
     check(folder)
 
 
-@pytest.mark.slow
-def test_the_short_form_writes_results_and_page(tmp_path):
-    assert main(["--quick", "--out", str(tmp_path)]) == 0
-    found = json.loads((tmp_path / "results-usual.json").read_text(encoding="utf-8"))
+def test_the_short_form_writes_results_and_page(out):
+    found = json.loads((out / "results-usual.json").read_text(encoding="utf-8"))
     assert [trial["number"] for trial in found["each"]] == [0, 1]
-    assert "Seed 0, 2 trials." in (tmp_path / "README.md").read_text(encoding="utf-8")
-    assert (tmp_path / "reliability-usual.png").exists()
+    assert f"Seed {SEED}, 2 trials." in (out / "README.md").read_text(encoding="utf-8")
+    assert (out / "reliability-usual.png").exists()

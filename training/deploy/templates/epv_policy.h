@@ -21,7 +21,6 @@ extern "C" {
 
 #define EPV_POLICY_READINGS $readings
 #define EPV_POLICY_INPUTS $inputs
-#define EPV_POLICY_HISTORY $history
 #define EPV_POLICY_PERIOD_US $period_us
 
 /* What the control unit knows at the end of a period. */
@@ -34,29 +33,22 @@ typedef struct {
     uint8_t coil; /* 1: the coil was energised in the period that has just ended, 0: it was not */
 } epv_policy_readings;
 
-/* What is learnt of one valve; controllers/valve_learner.py says what each entry means. */
-$valve
+/* What is remembered and learnt of one valve; controllers/sensor_check.py and valve_learner.py say what
+ * each entry means. */
+$records
 /* What one valve's controller remembers. Keep one for each valve; set to zero, it begins anew and
  * takes the first readings for its past. */
 typedef struct {
-    float p2[EPV_POLICY_HISTORY]; /* rings of the latest readings, bar */
-    float p3[EPV_POLICY_HISTORY];
-    float last[5]; /* last good p1, p2, p3, current, target */
-    uint16_t waited; /* periods since the coil was switched, saturating */
-    uint8_t newest; /* place of the newest readings in the rings */
-    uint8_t coil;
-    uint8_t begun;
-    uint8_t lost; /* latest periods in a row with a lost reading, saturating */
-    uint8_t fallback; /* what the controller that does not read p3 has decided */
-    uint8_t failed; /* 1: p3 was implausible or readings were lost, and that controller decides */
-    uint16_t periods; /* since the start, saturating */
+    epv_senses senses;
     epv_valve valve;
+    uint16_t waited; /* periods since the coil was switched, saturating */
+    uint8_t coil;
 } epv_policy_memory;
 
 /* One period: remember the readings, return what the coil shall do next (0 off, 1 on). */
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
-/* Its parts, for readings that are all good: the readings as the observation (the first EPV_POLICY_READINGS
+/* Its parts: the readings as the observation (the first EPV_POLICY_READINGS
  * entries of the inputs), what is learnt and advised (the entries behind them; returns whether a rule keeps
  * the coil on), and the network's {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,

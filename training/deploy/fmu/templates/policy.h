@@ -46,18 +46,15 @@ static const char *model_begin(model *m)
     return NULL;
 }
 
-/* Whether the memory of a state from outside leads into its rings, and its clock goes on from here. */
+/* Whether the memory of a state from outside holds numbers, and its clock goes on from here. */
 static int model_is_sound(const model *m)
 {
-    const float *learnt = (const float *)&m->memory.valve, *read = (const float *)&m->memory;
+    const float *remembered = (const float *)&m->memory;
     size_t k;
-    for (k = 0; k < sizeof m->memory.valve / sizeof *learnt; k++)
-        if (isnan(learnt[k]))
+    for (k = 0; k < offsetof(epv_policy_memory, waited) / sizeof *remembered; k++)
+        if (isnan(remembered[k]))
             return 0;
-    for (k = 0; k < offsetof(epv_policy_memory, waited) / sizeof *read; k++) /* rings and last readings */
-        if (!isfinite(read[k]))
-            return 0;
-    return m->memory.newest < EPV_POLICY_HISTORY && m->elapsed >= 0.0 && isfinite(m->elapsed) &&
+    return m->elapsed >= 0.0 && isfinite(m->elapsed) &&
            m->decisions * PERIOD_S >= m->elapsed - PERIOD_S;
 }
 

@@ -1,0 +1,195 @@
+"""The check of the sensors in front of a policy: what becomes of lost readings and of a p3 that freezes.
+
+A reading is lost if it is not finite or lies beyond the ends of its sensor. For HELD periods the last
+good reading takes its place. The coil decides where p3 goes: on, the control chamber fills up to p1;
+off, it empties to the ambient pressure. A p3 far from that end that stands still contradicts the coil.
+After either a hysteresis that does not read p3 takes over until the reset. Without p2 and a target it is
+blind, and the coil stays on.
+
+The compiled functions work on one valve with plain arithmetic, so that they can be translated to C.
+"""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from controllers.base import compiled, composed, in_unit
+from controllers.hysteresis import two_points
+from controllers.knowledge import above_band
+from epv_env.observation import CENTRE, HISTORY, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE
+from epv_env.plant.channels import CURRENT, P1, P2, P3, Sensor
+
+HELD = 3
+"""Control periods for which a reading is held: fewer than the four after which p3 stands still."""
+WAIT = 25e-3
+"""Time for which the coil has been as it is before p3 must move [s]: the armature's delay, the latency
+of the command, and the four periods over which the change is observed."""
+STILL = 0.02
+"""Change over four periods below which p3 stands still [bar]: twice the standard deviation that Table
+3's noise gives it. A chamber that fills or empties moves many times as much."""
+MARGIN = 0.5
+"""Distance of p3 from the end that it goes to, within which it may stand still [bar]."""
+AMBIENT = 1.0
+"""Pressure that the chamber empties to [bar]."""
+MOST_PERIODS = 65535.0
+"""Periods at which a counter stays."""
+
+CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT, "target": P2}
+"""Whose ends bound each reading: a target beyond the sensor of p2 cannot be followed."""
+READINGS = len(CHANNELS)
+_P1, _P2, _P3, _I, _TARGET = range(READINGS)
+_ENTRIES = np.array([INDEX[name] for name in ("p1", "p2_error", "p3", "I", "target")])
+_P2_CHANGES, _P3_CHANGES = INDEX["p2_change_1"], INDEX["p3_change_1"]
+_P2_LAGS, _P3_LAGS = np.array(P2_LAGS), np.array(P3_LAGS)
+_ERROR, _COIL, _SINCE, _P3_MOVED = (
+    INDEX[name] for name in ("p2_error", "action", "since_switching", "p3_change_4")
+)
+
+START = np.array([10.0, 8.0, 8.0, 0.3, 8.0])
+"""What is held before the first good readings, (5,) [bar, A]: the middle of the observation."""
+
+SENSES = np.dtype(
+    (
+        np.record,
+        [
+            ("now", np.float64, (READINGS,)),  # CHANNELS as read, then as held [bar, A]
+            ("last", np.float64, (READINGS,)),  # the last good ones
+            ("p2", np.float64, (HISTORY,)),  # held readings, the newest first [bar]
+            ("p3", np.float64, (HISTORY,)),
+            ("lost", np.float64),  # latest periods in a row in each of which a reading was lost
+            ("whole", np.float64),  # latest periods in a row without a loss
+            ("periods", np.float64),  # since the reset
+            ("begun", np.float64),  # 1: all readings were good once, or HELD is over
+            ("blind", np.float64),  # 1: p2 or the target is lost now
+            ("failed", np.float64),  # 1: the hysteresis has taken over
+            ("fallback", np.float64),  # what the hysteresis decides
+        ],
+    )
+)
+"""What the check remembers of one valve."""
+
+
+class Ends(NamedTuple):
+    """Least and greatest good reading of CHANNELS, (5,) each [bar, A]."""
+
+    least: NDArray
+    greatest: NDArray
+
+
+def ends_of(sensors: Mapping[str, Sensor]) -> Ends:
+    """The sensors' ends, by channel; a step of the converter beyond them is allowed."""
+    ends = [
+        (*each.constants()[3:], each.resolution) for each in (sensors[c.name] for c in CHANNELS.values())
+    ]
+    return Ends(*np.array([[low - step, high + step] for low, high, step in ends]).T.copy())
+
+
+@compiled
+def is_good(value, ends, i):
+    """Whether a reading is good; NaN is not."""
+    return value >= ends.least[i] and value <= ends.greatest[i]
+
+
+@compiled
+def hold(s, ends):
+    """Put the last good readings in the place of lost ones, in `now`."""
+    if s.periods == 0:
+        for i in range(READINGS):
+            s.last[i] = START[i]
+        s.whole, s.fallback = HISTORY, 1.0
+    s.periods = min(s.periods + 1, MOST_PERIODS)
+    s.blind = 0.0 if is_good(s.now[_P2], ends, _P2) and is_good(s.now[_TARGET], ends, _TARGET) else 1.0
+    lost = 0.0
+    for i in range(READINGS):
+        good = is_good(s.now[i], ends, i)
+        if i == _P2 and s.blind > 0:
+            good = False
+        if good:
+            s.last[i] = s.now[i]
+        else:
+            lost = 1.0
+        s.now[i] = s.last[i]
+    s.lost = min(s.lost + 1, MOST_PERIODS) if lost > 0 else 0.0
+    s.whole = 0.0 if lost > 0 else min(s.whole + 1, MOST_PERIODS)
+
+
+@compiled
+def remember(s):
+    """Keep the held readings; the first ones stand for the past."""
+    for k in range(1, HISTORY):
+        older = HISTORY - k
+        s.p2[older] = s.p2[older - 1] if s.begun > 0 else s.now[_P2]
+        s.p3[older] = s.p3[older - 1] if s.begun > 0 else s.now[_P3]
+    s.p2[0], s.p3[0] = s.now[_P2], s.now[_P3]
+    if s.lost == 0 or s.lost > HELD:
+        s.begun = 1.0
+
+
+@compiled
+def entry(value, i):
+    """Entry i of an observation [-] from its value in its unit."""
+    return min(max((value - CENTRE[i]) / SCALE[i], -LIMIT[i]), LIMIT[i])
+
+
+@compiled
+def show(s, observation):
+    """Write what is held, and its changes, into an observation (entries,) [-]."""
+    observation[_ENTRIES[_P1]] = entry(s.now[_P1], _ENTRIES[_P1])
+    observation[_ENTRIES[_P3]] = entry(s.now[_P3], _ENTRIES[_P3])
+    observation[_ENTRIES[_I]] = entry(s.now[_I], _ENTRIES[_I])
+    observation[_ENTRIES[_TARGET]] = entry(s.now[_TARGET], _ENTRIES[_TARGET])
+    observation[_ERROR] = entry(s.now[_P2] - s.now[_TARGET], _ERROR)
+    for k in range(len(_P2_LAGS)):
+        observation[_P2_CHANGES + k] = entry(s.p2[0] - s.p2[_P2_LAGS[k]], _P2_CHANGES + k)
+    for k in range(len(_P3_LAGS)):
+        observation[_P3_CHANGES + k] = entry(s.p3[0] - s.p3[_P3_LAGS[k]], _P3_CHANGES + k)
+
+
+@compiled
+def implausible(s, observation, period):
+    """Whether p3 stands still where the coil should move it."""
+    p3 = s.now[_P3]
+    remains = s.now[_P1] - p3 if observation[_COIL] > 0 else p3 - AMBIENT
+    # What happened before the first observation is not known: the coil may have switched just then.
+    known = min(in_unit(observation, _SINCE), s.periods * period)
+    still = abs(in_unit(observation, _P3_MOVED)) < STILL
+    return still and remains > MARGIN and known > WAIT - period / 2  # whole periods
+
+
+@compiled
+def watch(s, observation, thresholds, period):
+    """Judge the sensors by an observation of held readings; the hysteresis follows every valve."""
+    if s.lost > HELD or implausible(s, observation, period):
+        s.failed = 1.0
+    s.fallback = two_points(s.fallback, observation, thresholds, period)
+
+
+@compiled
+def read(s, observation):
+    """The readings behind an observation (entries,), into `now`."""
+    for k in range(READINGS):
+        s.now[k] = in_unit(observation, _ENTRIES[k])
+    s.now[_P2] += s.now[_TARGET]  # an observation shows p2 by its distance from the target
+
+
+@composed
+def checked(s, observation, ends, thresholds, period):
+    """Take in an observation (entries,), and put what is held into it."""
+    read(s, observation)
+    hold(s, ends)
+    remember(s)
+    if s.whole < HISTORY:  # a change over past readings reaches back to a loss
+        show(s, observation)
+    watch(s, observation, thresholds, period)
+
+
+@compiled
+def overruled(s, action):
+    """What the coil does, 0 (off) or 1 (on), if the policy wants `action`."""
+    if above_band(s.now[_P2] - s.now[_TARGET]):
+        return 1.0  # whoever decides
+    if s.begun == 0 or (s.failed > 0 and s.blind > 0):
+        return 1.0  # there is nothing to decide by
+    return s.fallback if s.failed > 0 else action

@@ -1,0 +1,48 @@
+"""`epv log`: a simulated valve's log, with an effect from a drive on."""
+
+import numpy as np
+import pytest
+
+from epv_env.common.commands import main_of
+from identification.recordings.log_files import read_log
+
+pytestmark = pytest.mark.training
+
+
+def log(*words: object) -> int:
+    """Run `epv log` under a simple controller, two drives of a second unless the words say otherwise."""
+    line = ["--controller", "hysteresis", "--drives", 2, "--duration", 1.0, *words]
+    return main_of("training.commands.log", program="epv log", arguments=[str(word) for word in line])
+
+
+def test_an_effect_acts_from_its_drive_on(tmp_path):
+    assert log("--out", tmp_path / "as-it-is") == 0
+    assert log("--out", tmp_path / "late", "--effect", "command_delay", "--from-drive", 2) == 0
+    same, other = (
+        [drive.p3 for drive in read_log(tmp_path / name).drives] for name in ("as-it-is", "late")
+    )
+    np.testing.assert_array_equal(same[0], other[0])
+    assert len(same[1]) == len(other[1]) == 200
+    assert np.any(same[1] != other[1])
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["--controller", "PWM"], "'PWM' cannot have written a log"),
+        (["--controller", "informed pulse"], "'informed pulse' cannot have written a log"),
+        (["--effect", "gremlins"], "unknown effect; known are"),
+        (["--effect", "command_delay", "--from-drive", 3], "--from-drive 3 comes after the last of 2"),
+        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
+    ],
+)
+def test_what_cannot_be_logged_is_one_sentence(words, message, tmp_path, capsys):
+    assert log("--out", tmp_path / "log", *words) == 2
+    assert message in capsys.readouterr().err.splitlines()[-1]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_log_is_not_overwritten(tmp_path, capsys):
+    (tmp_path / "drive-1.csv").touch()
+    assert log("--out", tmp_path) == 2
+    assert "holds files already: give another folder" in capsys.readouterr().err
