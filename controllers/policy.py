@@ -1,8 +1,8 @@
 """A learned policy as a controller: readings and learnt quantities in, a coil's state out.
 
 The policy is a small net without memory. Its output is added to the advice of the adaptive pulse, and
-rules and shields stand in front of it (controllers/knowledge.py). The controller believes its readings, so the
-check of the sensors comes first (controllers/sensor_check.py).
+rules and shields stand in front of it (controllers/knowledge.py). The controller believes its readings,
+so the check of the sensors comes first (controllers/sensor_check.py).
 """
 
 from dataclasses import dataclass, field

@@ -140,12 +140,13 @@ int main(void)
         if (!error_lost && error >= 0.5f && ++above && !coil)
             return 1;
         if (!gone && error <= -0.5f && now.coil && now.p1 - now.p2 > 1.001f &&
-            now.p1 - now.p3 < 0.499f && m.senses.failed == 0 && m.senses.begun > 0 && !(m.valve.after_period_early > 0)) {
+            now.p1 - now.p3 < 0.499f && m.senses.failed == 0 && m.senses.begun > 0 &&
+            !(m.valve.after_period_early > 0)) {
             below++;
             if (coil)
                 return 2;
         }
-        if (gone && other.senses.begun > 0 && m.senses.failed == 0) { /* as if the last good readings stood there */
+        if (gone && other.senses.begun > 0 && m.senses.failed == 0) { /* as the last good ones */
             lost++;
             if (epv_policy_step(&other, &held) != coil)
                 return 3;

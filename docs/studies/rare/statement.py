@@ -82,15 +82,12 @@ def batch(statement: Statement, region: str, first: int) -> dict[str, Any]:
 
 
 def results(statement: Statement, journal: Journal, region: str) -> dict[str, Any]:
-    """What is known of a region: episodes, seeds that left, exceedances, the worst."""
+    """What is known of a region: episodes, seeds that left, the worst excursion and its seed."""
     found = [journal[name] for name in names(statement, region) if name in journal]
     return {
         "episodes": BATCH * len(found),
         "left": [seed for each in found for seed in each["left"]],
-        "above": np.sum([each["above"] for each in found] or [[0]], axis=0).tolist(),
-        "worst": max(
-            (tuple(reversed(pair)) for each in found for pair in each["worst"]), default=(0, 0)
-        ),
+        "worst": max((each["worst"][0][::-1] for each in found), default=[0.0, 0]),
     }
 
 
@@ -112,14 +109,7 @@ def page_table(statement: Statement, journal: Journal) -> str:
             f"{low:.2g} to {high:.2g}",
             f"{known['worst'][0]:.3f} (seed {known['worst'][1]})", ", ".join(map(str, left)) or "none",
         ])  # fmt: skip
-    headings = [
-        "plants",
-        "episodes",
-        "left",
-        "95 % interval",
-        "worst excursion [bar]",
-        "seeds that left",
-    ]
+    headings = ["plants", "episodes", "left", "95 % interval", "worst [bar]", "seeds that left"]
     return table(headings, rows)
 
 

@@ -60,10 +60,13 @@ def markdown(rows: pd.DataFrame) -> str:
 
 
 def sensor_rows(found: pd.DataFrame) -> pd.DataFrame:
-    """Faults of one sensor: share that leaves, and worst excursion, of each controller."""
-    text = found["left_percent"].map("{:.0f} %, ".format) + found["worst_bar"].map("{:.2f} bar".format)
+    """Faults of one sensor where some controller left: share that leaves, and worst excursion."""
+    worst = found["worst_bar"].map("{:.2f} bar".format).replace("inf bar", "empties")
+    text = found["left_percent"].map("{:.0f} %, ".format) + worst
+    found = found[found.groupby("fault")["left_percent"].transform("max") > 0]
     wide = found.assign(text=text).pivot(index="fault", columns="controller", values="text")
-    return wide.loc[[f"{channel} {fault}" for ((channel, fault),) in SINGLE]].reset_index()
+    single = [f"{channel} {fault}" for ((channel, fault),) in SINGLE]
+    return wide.loc[[name for name in single if name in wide.index]].reset_index()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
