@@ -33,7 +33,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "ppo-conf": ("--region", "confidence", "--least", "1e-6"),
 }
 """Options of `epv rare` by the name of the folder of results."""
-SIZE = ("--particles", "256", "--repetitions", "6")
+SIZE = ("--particles", "2048", "--repetitions", "10")
 FAULT_EPISODES = 12
 """Of each fault alone; a quarter of it of each pair."""
 FAULT_SEED = STATEMENT_SEED + RANGE
@@ -61,8 +61,8 @@ def markdown(rows: pd.DataFrame) -> str:
 
 def sensor_rows(found: pd.DataFrame) -> pd.DataFrame:
     """Faults of one sensor where some controller left: share that leaves, and worst excursion."""
-    worst = found["worst_bar"].map("{:.2f} bar".format).replace("inf bar", "empties")
-    text = found["left_percent"].map("{:.0f} %, ".format) + worst
+    worst = found["worst_bar"].map("{:.2f}".format).replace("inf", "empties")
+    text = found["left_percent"].map("{:.0f}%, ".format) + worst
     found = found[found.groupby("fault")["left_percent"].transform("max") > 0]
     wide = found.assign(text=text).pivot(index="fault", columns="controller", values="text")
     single = [f"{channel} {fault}" for ((channel, fault),) in SINGLE]
