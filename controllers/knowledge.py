@@ -9,8 +9,8 @@ adaptive pulse (controllers/pulse.py). Two rules keep the coil on, whatever the 
 
 Two shields turn what an ordinary episode shows into what no reading can change:
 
-3. p2 as read lies above the band: coil on. It comes last (controllers/sensor_check.py), so it overrules
-   whatever decides where sensors fail, too.
+3. p2 as read lies above the band: coil on. It stands in front of whatever decides, the controller that
+   takes over where sensors fail included.
 4. p2 as read lies below the band, the supply is high and nothing is under way, since the coil is on and
    the control chamber full: coil off, unless a rule above says on. One period off cannot open the valve.
 
@@ -82,10 +82,17 @@ def above_band(error):
 
 
 @compiled
-def below_band(v, observation):
-    """Shield 4: whether p2 as read lies below the band, and the valve is at rest and can be opened."""
-    low = in_unit(observation, _ERROR) <= -BAND_BAR
-    return low and v.on > 0 and v.head >= HIGH_HEAD and v.p1 - v.p3 <= FULL
+def below_band(v, error):
+    """Shield 4: whether p2 - target as read [bar] lies below the band, and the valve can be opened."""
+    return error <= -BAND_BAR and v.on > 0 and v.head >= HIGH_HEAD and v.p1 - v.p3 <= FULL
+
+
+@compiled
+def forced(v, error):
+    """What rules and shields force for p2 - target as read [bar]: 1 coil on, -1 coil off, 0 nothing."""
+    if cannot_raise(v) or would_rise_too_far(v) or above_band(error):
+        return 1.0
+    return -1.0 if below_band(v, error) else 0.0
 
 
 show_learnt: Any = generated(
@@ -102,24 +109,22 @@ show_learnt: Any = generated(
 def describe(v, observation, c, period, inputs):
     """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
 
-    c: a Knowledge. Returns whether a rule keeps the coil on.
+    c: a Knowledge. Returns what rules and shields force.
     """
     follow(v, observation, c, period)
     for i in range(READINGS):
         inputs[i] = observation[i]
     show_learnt(v, inputs)
-    return cannot_raise(v) or would_rise_too_far(v)
+    return forced(v, in_unit(observation, _ERROR))
 
 
 def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, observations, c, period, inputs, must_shut, must_open):
+    def describe_all(valves, observations, c, period, inputs, forces):
         if digest == "":
             return
         for i in range(len(valves)):
-            ruled = describe(valves[i], observations[i], c, period, inputs[i])
-            must_shut[i] = ruled or above_band(in_unit(observations[i], _ERROR))
-            must_open[i] = below_band(valves[i], observations[i]) and not ruled
+            forces[i] = describe(valves[i], observations[i], c, period, inputs[i])
 
     return describe_all
 
@@ -139,7 +144,7 @@ class ValveKnowledge:
         """Forget the valves; n episodes begin."""
         self.valves = np.zeros(n, VALVE)
         """What is known of each valve, records (n,)."""
-        self._forced = np.zeros((2, n), dtype=bool)
+        self._forces = np.zeros(n)
 
     def forget(self, who: NDArray) -> None:
         """Forget the valves of these episodes, indices (m,): others begin in their place."""
@@ -147,24 +152,23 @@ class ValveKnowledge:
 
     def observe(self, observations: NDArray) -> NDArray:
         """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
-        return self._described(self.valves, observations, self._forced)
+        return self._described(self.valves, observations, self._forces)
 
     def overruled(self, actions: NDArray) -> NDArray:
         """Actions (n,) as rules and shields leave them, for the observations taken in last."""
-        must_shut, must_open = self._forced
-        return np.where(must_shut, 1, np.where(must_open, 0, actions))
+        return np.where(self._forces > 0, 1, np.where(self._forces < 0, 0, actions))
 
     def last(self, who: NDArray, observations: NDArray) -> NDArray:
         """What `observe` gives for the last observations (m, entries) of episodes `who` (m,) that end;
         their valves are forgotten."""
         ending = self.valves[who]
         self.forget(who)
-        return self._described(ending, observations, np.zeros((2, len(who)), bool))
+        return self._described(ending, observations, np.zeros(len(who)))
 
-    def _described(self, valves: NDArray, observations: NDArray, forced: NDArray) -> NDArray:
+    def _described(self, valves: NDArray, observations: NDArray, forces: NDArray) -> NDArray:
         inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
         seen = np.asarray(observations, dtype=np.float32)
-        _describe_all(valves, seen, self._constants, self._period, inputs, *forced)
+        _describe_all(valves, seen, self._constants, self._period, inputs, forces)
         return inputs
 
 

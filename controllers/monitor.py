@@ -2,12 +2,14 @@
 
 It reads what a control unit reads. Every opening of the valve gives a few features. Their departure from
 what the identified plant shows, less the valve's own offset, is tested against the effects of the
-catalogue by a Shiryaev-Roberts statistic (docs/how-to/monitor-a-valve.md). Memory is bounded.
+catalogue by a Shiryaev-Roberts statistic (docs/how-to/monitor-a-valve.md). A change that is settled
+becomes the reference, from which the next one, or the return, is told. Memory is bounded.
 """
 
 from collections import deque
 from dataclasses import dataclass
 from os import PathLike
+from pathlib import Path
 from typing import Any
 
 import msgspec
@@ -19,6 +21,8 @@ from epv_env.common.files import JSONFileError, read_json, write_json
 
 FORMAT = "epv-monitor/1"
 REMEDY = "make the monitor anew with `epv monitor`"
+SHIPPED = Path(__file__).with_name("monitor.json")
+"""The model of a monitor for the report's valve; `python -m training.monitoring` makes it."""
 
 BEFORE, AFTER = 8, 5
 """Control periods with the coil on that an opening needs before and after."""
@@ -40,6 +44,17 @@ UNKNOWN = "unknown"
 """Name of a change that no effect of the catalogue explains."""
 UNKNOWN_SHARE, UNKNOWN_SHIFT = 0.2, 4.0
 """Its prior probability [-], and its size in each whitened feature [standard deviations]."""
+RETURN = "return"
+"""Name of a change that takes back the latest one: a repair, a supply that is restored."""
+RETURN_SHARE = 0.2
+"""Prior probability of a return, once something has changed [-]."""
+SETTLING = 12
+"""Openings for which an alarm must last until its change is settled: its cause needs them."""
+RELEARNT = 0.5 * np.pi / SETTLING
+"""Variance of the median of the openings of a settled alarm, in variances of one opening: the new
+reference, which an opening with a jump of consumption does not move."""
+CHANGES = 100
+"""Settled changes that are remembered."""
 SMALLEST, LARGEST = 1e-9, 1e9
 """Least scale and variance, and greatest magnitude, of a model's numbers: no simulation gives others."""
 LEAST = 1e-300
@@ -214,13 +229,29 @@ class OpeningReader:
         return None
 
 
+@dataclass(frozen=True)
+class Change:
+    """A change of the valve, as the monitor saw it when it was settled, or sees it now."""
+
+    onset: float
+    """When it began [s]; 0: before the start."""
+    probability: float
+    """That something has changed [-]."""
+    causes: dict[str, float]
+    """Probability of each effect, UNKNOWN and RETURN, if something has changed, the likeliest first."""
+    components: dict[str, float]
+    """The same by component."""
+
+
 class Monitor:
     """Follows one valve: `update` once a control period, beside whatever controller.
 
     Attributes:
         period: of control [s], in which the features count.
         time: since the start [s].
-        probability: that something has changed, if changes are as frequent as the stated false alarms.
+        probability: that something has changed since the reference was learnt, if changes are as
+            frequent as the stated false alarms.
+        settled: the latest changes that have become the reference.
         history: the latest (time [s], log odds [-]), for a plot.
         restarts: how often it began anew because its state was not finite.
     """
@@ -233,28 +264,39 @@ class Monitor:
             raise ValueError(f"false_alarms_per_hour = {false_alarms_per_hour:g}: give more than 0")
         self.model, self.threshold = model, 1.0 / false_alarms_per_hour
         self.history: deque[tuple[float, float]] = deque(maxlen=10_000)
+        self.settled: deque[Change] = deque(maxlen=CHANGES)
         self._reader, self._periods, self.restarts = OpeningReader(), 0, 0
         width = len(model.offset)
-        unknown = UNKNOWN_SHIFT * np.concatenate([np.eye(width), -np.eye(width)])
         alone = np.zeros((2 * width, width, LINEAR))
-        alone[:, :, 0] = unknown
+        alone[:, :, 0] = UNKNOWN_SHIFT * np.concatenate([np.eye(width), -np.eye(width)])
         shifts = np.concatenate([share * model.shifts for share in STRENGTHS] + [alone])
-        self._names = [*model.effects * len(STRENGTHS), *(UNKNOWN,) * 2 * width]
-        self._parts = [*model.components * len(STRENGTHS), *(UNKNOWN,) * 2 * width]
+        unknown = (UNKNOWN,) * len(alone)
         # Every shift twice: it came before the start, where the offset hides it, or it comes later.
         self._shifts = np.concatenate([shifts, shifts])
-        self._weights = np.tile(_weights(self._names), 2)
-        self._later = np.repeat([0.0, 1.0], len(shifts))
+        self._names = [*(*model.effects * len(STRENGTHS), *unknown) * 2, RETURN]
+        self._parts = [*(*model.components * len(STRENGTHS), *unknown) * 2, RETURN]
+        self._weights = _weights(self._names)
+        self._later = np.repeat([0.0, 1.0, 0.0], [len(shifts), len(shifts), 1])
         self.restart()
 
     def restart(self) -> None:
         """Believe that nothing has changed, and learn the valve's offset anew."""
-        self._mean, self._variance = np.zeros(len(self.model.offset)), self.model.offset.copy()
-        self._learnt = np.zeros(self._shifts.shape[:2])  # of each shift, by the mean
+        self._later[-1] = 0.0  # nothing to return from
+        self._back = np.zeros((len(self.model.offset), LINEAR))
+        self._reference = self._back.copy()
+        self._recent: deque[tuple[NDArray, NDArray]] = deque(maxlen=SETTLING)
+        self._before = np.zeros(len(self._back))
+        self._refer(self._before, self.model.offset, BEFORE_START)
+
+    def _refer(self, mean: NDArray, variance: NDArray, before: float) -> None:
+        """Learn the state from here on. before: time in which an earlier change may be hidden [h]."""
+        self._mean, self._variance = mean.copy(), variance.copy()
+        self._learnt = np.zeros((len(self._names), len(mean)))  # of each shift, by the mean
         # logarithm of the Shiryaev-Roberts statistic of each shift [h]
-        self._log = np.log(np.maximum(BEFORE_START * (1.0 - self._later), LEAST))
-        self._since = np.zeros(len(self._later))
-        self._last = self.time
+        earlier = (self._later == 0.0) & (np.array(self._names) != RETURN)
+        self._log = np.log(np.maximum(before * earlier, LEAST))
+        self._since = np.full(len(self._later), self.time if self.settled else 0.0)
+        self._last, self._alarms = self.time, 0
 
     def pause(self) -> None:
         """The control unit restarts or skips periods: openings do not reach across."""
@@ -285,9 +327,17 @@ class Monitor:
         """When it changed, if it did [s]; 0: before the start."""
         return float(self._shares() @ self._since)
 
+    @property
+    def changes(self) -> list[Change]:
+        """The settled changes, and that of an alarm that has not settled yet, in order of time."""
+        return [*self.settled, *([self._change()] if self.alarm else [])]
+
     def hypotheses(self) -> tuple[NDArray, NDArray, NDArray, list[str]]:
-        """Of each: shift (hypotheses, features, LINEAR), prior, 1 if it comes later, and effect."""
-        return self._shifts, self._weights, self._later, self._names * 2
+        """Of each: shift (hypotheses, features, LINEAR), prior, 1 if it comes later, and effect.
+
+        The return, which has no shift of its own, is the last one of the priors and effects.
+        """
+        return self._shifts, self._weights, self._later[:-1], self._names
 
     def causes(self) -> dict[str, float]:
         """Probability of each effect, if something has changed, the likeliest first."""
@@ -321,12 +371,13 @@ class Monitor:
         """
         model, spread = self.model, 1.0 + self._variance
         x = polynomial(conditions, model.centre, model.scale)
-        limit = CLIPPED * np.sqrt(spread)
+        limit, linear = CLIPPED * np.sqrt(spread), x[:LINEAR]
         departure = model.whiten @ z - model.expected @ x
         if not np.all(np.isfinite(departure)):
             return
-        found = departure - self._mean
-        shift = self._shifts @ x[:LINEAR] - self._learnt
+        found = departure - self._reference @ linear - self._mean
+        back = self._later[-1] * (self._before - self._back @ linear - self._mean)
+        shift = np.vstack([self._shifts @ linear - self._learnt[:-1], back])
         far = [np.minimum(each**2, limit**2) for each in (found, found - shift)]
         hours = self._later * (self.time - self._last) / 3600.0
         prior = np.logaddexp(self._log, np.log(np.maximum(hours, LEAST)))
@@ -344,6 +395,26 @@ class Monitor:
             self.restarts += 1
             self.restart()
         self.history.append((self.time, self.log_odds))
+        self._recent.append((departure, linear))
+        self._alarms = self._alarms + 1 if self.alarm else 0
+        if self._alarms == SETTLING:
+            self._settle()
+
+    def _settle(self) -> None:
+        """The present state becomes the reference; the latest change can be taken back from now on."""
+        shares = self._shares()
+        likeliest = int(np.argmax(shares))
+        self.settled.append(self._change())
+        returned = likeliest == len(self._shifts)
+        self._back = -self._back if returned else self._shifts[likeliest]
+        self._reference = self._reference + self._back
+        self._later[-1] = 1.0
+        self._before = self._mean - shares @ self._learnt
+        mean = np.median([z - self._reference @ x for z, x in self._recent], axis=0)
+        self._refer(mean, np.full(len(mean), RELEARNT), 0.0)
+
+    def _change(self) -> Change:
+        return Change(self.onset, self.probability, self.causes(), self.components())
 
     def _shares(self) -> NDArray:
         """Probability of each shift, if something has changed."""
@@ -352,15 +423,14 @@ class Monitor:
 
     def _summed(self, names: list[str]) -> dict[str, float]:
         sums = dict.fromkeys(names, 0.0)
-        for name, share in zip(names * 2, self._shares(), strict=True):
+        for name, share in zip(names, self._shares(), strict=True):
             sums[name] += float(share)
         return dict(sorted(sums.items(), key=lambda item: -item[1]))
 
 
 def _weights(names: list[str]) -> NDArray:
-    """Prior of each shift: UNKNOWN_SHARE for the unknown, the rest evenly over the effects."""
-    count = {name: names.count(name) for name in names}
-    known = len(count) - 1
-    return np.array(
-        [(UNKNOWN_SHARE if n == UNKNOWN else (1.0 - UNKNOWN_SHARE) / known) / count[n] for n in names]
-    )
+    """Prior of each shift, which comes early or late: UNKNOWN_SHARE, RETURN_SHARE, the rest evenly."""
+    count = {name: names.count(name) / 2 for name in names} | {RETURN: 1}
+    shares = {UNKNOWN: UNKNOWN_SHARE, RETURN: RETURN_SHARE}
+    known = (1.0 - UNKNOWN_SHARE) / max(len(count) - len(shares), 1)
+    return np.array([shares.get(name, known) / count[name] for name in names])

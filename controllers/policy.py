@@ -14,21 +14,24 @@ import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, composed
+from controllers.base import DIGEST, OneValve, composed, in_unit
 from controllers.hysteresis import Hysteresis, Thresholds
-from controllers.knowledge import READINGS, below_band, describe
+from controllers.knowledge import READINGS, above_band, describe
 from controllers.network import Network, Weights, forward
 from controllers.policy_files import read_policy
 from controllers.pulse import Knowledge, nominal_knowledge
 from controllers.sensor_check import SENSES, Ends, checked, ends_of, overruled
 from controllers.tuned import tuned
 from controllers.valve_learner import LEARNT, VALVE
+from epv_env.observation import INDEX
 from epv_env.plant.plantfile import Plant, load_plant
 
 TRAINED = Path(__file__).parent / "trained"
 """The policy that comes with the package."""
 FALLBACK = "extrapolating hysteresis"
 """Takes over where sensors fail: the best of the controllers that do not read p3."""
+
+_ERROR = INDEX["p2_error"]
 
 
 class Parts(NamedTuple):
@@ -44,10 +47,12 @@ class Parts(NamedTuple):
 def decide(m, observation, c, period):
     """One valve's decision (controllers.base.OneValve). c: Parts."""
     checked(m.senses, observation, c.ends, c.fallback, period)
-    must_shut = describe(m.valve, observation, c.knowledge, period, m.inputs)
+    force = describe(m.valve, observation, c.knowledge, period, m.inputs)
     forward(c.weights, m.inputs, m.signals)
-    off = m.signals[0, 0] >= m.signals[0, 1] or below_band(m.valve, observation)
-    return overruled(m.senses, 0.0 if off and not must_shut else 1.0)
+    off = force < 0 or (force == 0 and m.signals[0, 0] >= m.signals[0, 1])
+    if above_band(in_unit(observation, _ERROR)):  # this shield holds for the fall-back, too
+        return 1.0
+    return overruled(m.senses, 0.0 if off else 1.0)
 
 
 def _loop(digest: str) -> Any:

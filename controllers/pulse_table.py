@@ -43,10 +43,6 @@ HARDEST_FLOW = SCENARIOS["emergency"].flow[1] * GRAM
 TIME_STEP, MOST_STEPS = 5e-3, 60
 """Time step in which simulated valves are watched until they have shut [s]; steps after which a valve
 counts as one that does not shut."""
-HELD_VOLUME = 1e9
-"""Factor of the circuit's volume that holds its pressure while the control chamber vents [1]."""
-VENTING_TIMES = np.array([0.0, 20e-3, 40e-3])
-"""Start, and two later times between which the control chamber's venting rate is taken [s]."""
 
 LEAST_RATIO, MOST_RATIO, RATIOS = 1.002, 50.0, 512
 """Chamber pressures over the ambient one for which venting times are tabulated [1], and their number."""
@@ -175,22 +171,10 @@ def change(table, t, cell, age, slope, stay):
 
 
 @compiled
-def gained(table, t, offset, p1, p2, p3, stay, slope):
-    """Change of p2 until the valve has shut, if the coil stays off for `stay` [s] [bar].
-
-    slope: of p2 by consumption [bar/s]. A stay that ends before age zero adds nothing.
-    """
-    age = venting_age(table, t, offset, p1, p2, p3)
-    cell = cell_of(p1, p2, age)
-    node, share = place(STAY, stay + min(age, 0.0))
-    low = change(table, t, cell, age, slope, node)
-    return low * (1 - share) + change(table, t, cell, age, slope, node + 1) * share
-
-
-@compiled
 def duration(table, t, offset, p1, p2, p3, asked, slope):
-    """The inverse of `gained`: how long the coil must stay off to change p2 by `asked` [bar] [s].
+    """How long the coil must stay off to change p2 by `asked` [bar] until the valve has shut [s].
 
+    slope: of p2 by consumption [bar/s].
     Zero where more than that is under way already; at most the table's end, long past opening.
     """
     age = venting_age(table, t, offset, p1, p2, p3)
@@ -241,7 +225,7 @@ def pulse_table(p: Mapping[str, float], *, supply_voltage: float = 24.0) -> Puls
 
 def nominal_table(plant: Plant) -> PulseTable:
     """The table that a controller of this nominal plant starts from. A plant's table is made once."""
-    return _cached_table(tuple(plant.parameters.items()), plant.voltage)
+    return pulse_tables([plant.parameters], plant.voltage)
 
 
 def pulse_tables(plants: Sequence[Mapping[str, float]], supply_voltage: float = 24.0) -> PulseTable:
@@ -253,9 +237,8 @@ def pulse_tables(plants: Sequence[Mapping[str, float]], supply_voltage: float = 
     return PulseTable(*(np.concatenate(parts) for parts in zip(*tables, strict=True)))
 
 
-@lru_cache(maxsize=1024)
+@lru_cache(maxsize=1024)  # searches and evaluations meet the same plants again and again
 def _cached_table(plant: tuple[tuple[str, float], ...], supply_voltage: float) -> PulseTable:
-    """The table of a plant. Searches and evaluations meet the same plants again and again."""
     return pulse_table(dict(plant), supply_voltage=supply_voltage)
 
 
@@ -271,13 +254,13 @@ def opening_pressure(p: Mapping[str, float], p1: NDArray, p2: NDArray) -> NDArra
     return p1 - ((p1 - p2) * seat + p["cPV"] * p["xPV0"]) / piston
 
 
-def _valves(p: Mapping[str, float], state: State, U: float) -> Valves:
+def _valves(p: Mapping[str, float], state: State, U_coil: float) -> Valves:
     """Valves in the given state (fields that broadcast to (n,)) under a constant voltage [V]."""
     valves = Valves(np.size(state.p2))
     valves.set_parameters(np.arange(valves.n), p)
     for field, value in zip(valves.state, state, strict=True):
         field[:] = value
-    valves.inputs.U[:] = U
+    valves.inputs.U[:] = U_coil
     return valves
 
 
@@ -294,45 +277,44 @@ def _record(p: Mapping[str, float], state: State, times: NDArray) -> State:
     )
 
 
-def _venting(p: Mapping[str, float], U: float) -> tuple[float, float]:
+def _venting(p: Mapping[str, float], U_supply: float) -> tuple[float, float]:
     """Rate of ln p3 with the coil off [1/s], and the armature's lag before it falls [s]."""
-    p1 = SUPPLY[1:2] * BAR
-    times = VENTING_TIMES
-    start = energised(p, p1=p1, p2=RATIO[3] * p1, U=U)
+    p1, times = SUPPLY[1:2] * BAR, np.array([0.0, 20e-3, 40e-3])
+    start = energised(p, p1=p1, p2=RATIO[3] * p1, U=U_supply)
     logs = np.log(_record(p, start, times).p3[0])
     rate = (logs[1] - logs[2]) / (times[2] - times[1])
     return float(rate), float(times[1] - (logs[0] - logs[1]) / rate)
 
 
-def _vented(p: Mapping[str, float], p1: NDArray, p2: NDArray, U: float) -> State:
+def _vented(p: Mapping[str, float], p1: NDArray, p2: NDArray, U_supply: float) -> State:
     """States at the ages of a pulse under way that has not raised p2 yet; fields (ages n,).
 
     p1, p2: (n,) [Pa].
     """
-    start = energised(p, p1=p1, p2=p2, U=U)
+    start = energised(p, p1=p1, p2=p2, U=U_supply)
     p3 = START_RATIO * opening_pressure(p, p1, p2)
     released = start._replace(p3=p3, xMV=0.0, I=0.0, I_coil=0.0)
-    under_way = _record({**p, "V2": HELD_VOLUME * p["V2"]}, released, AGE)
+    # A circuit of this volume holds its pressure while the control chamber vents.
+    under_way = _record({**p, "V2": 1e9 * p["V2"]}, released, AGE)
     return State(*(field.T.ravel() for field in under_way))
 
 
-def _shut_again(p: Mapping[str, float], state: State, U: float) -> tuple[NDArray, NDArray]:
+def _shut_again(p: Mapping[str, float], state: State, U_supply: float) -> tuple[NDArray, NDArray]:
     """After switching on in states (n, stay): p2 once the valve has shut [Pa], and when that is [s].
 
     Both (n, stay); the time is known to within half a time step. Raises ValueError for a plant that
     stays open.
     """
-    valves = _valves(p, State(*(field.ravel() for field in state)), U)
+    valves = _valves(p, State(*(field.ravel() for field in state)), U_supply)
     shutting = np.zeros(valves.n)
     for _ in range(MOST_STEPS):
         valves.advance(TIME_STEP)
         still_open = valves.state.xPV > 0
         shutting += np.where(still_open, TIME_STEP, 0.0)
         if not np.any(still_open):
-            return valves.state.p2.reshape(state.p2.shape), shutting.reshape(
-                state.p2.shape
-            ) + TIME_STEP / 2
+            shape = state.p2.shape
+            return valves.state.p2.reshape(shape), shutting.reshape(shape) + TIME_STEP / 2
     raise ValueError(
-        f"a pulse cannot be planned: {MOST_STEPS * TIME_STEP:g} s after switching on with {U:g} V "
-        "some valve is still open; check the plant's parameters"
+        f"a pulse cannot be planned: {MOST_STEPS * TIME_STEP:g} s after switching on with {U_supply:g} "
+        "V some valve is still open; check the plant's parameters"
     )

@@ -66,16 +66,11 @@ class PWM:
         wanted_p3 = opening + np.maximum(asked, -self.depth)
         duty = self.design.duty + self.design.inner_gain * (wanted_p3 - p3)
         duty = np.where(self._working, duty, 1.0)
-        inside = (
-            (duty > 0) & (duty < 1) & (asked > -self.depth)
-        )  # conditional integration against wind-up
+        # conditional integration against wind-up
+        inside = (duty > 0) & (duty < 1) & (asked > -self.depth)
         grown = self._integral + deviation * self.control_period / self.design.integral_time
         self._integral = np.where(inside, grown, np.where(self._working, self._integral, 0.0))
         return (2 * np.clip(duty, 0.0, 1.0) - 1)[:, None].astype(np.float32)
-
-
-DESIGN_P1, DESIGN_P2 = 11.5 * BAR, 8.0 * BAR
-"""Where the loop is designed: the middle of the reservoirs' range, and of the targets' [Pa]."""
 
 
 def build(values: Mapping[str, Any], plant: Plant) -> PWM:
@@ -87,9 +82,10 @@ def build(values: Mapping[str, Any], plant: Plant) -> PWM:
 
     loop = {name: values[name] for name in ("inner_time", "phase_margin", "integral_time")}
     rest = {name: value for name, value in values.items() if name not in loop}
-    shaped = design(
-        plant.parameters, p1=DESIGN_P1, p2=DESIGN_P2, period=PERIOD, supply_voltage=plant.voltage, **loop
-    )
+    shaped = design(  # in the middle of the reservoirs' range, and of the targets'
+        plant.parameters, p1=11.5 * BAR, p2=8.0 * BAR, period=PERIOD, supply_voltage=plant.voltage,
+        **loop,
+    )  # fmt: skip
     return PWM(design=shaped, parameters=plant.parameters, **rest)
 
 

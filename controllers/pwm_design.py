@@ -10,7 +10,6 @@ The loop is a cascade at the PWM period: p3 is fed back by a gain, p2 by a PI ar
 takes the slow lag of the control chamber out of the outer loop.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import control
@@ -25,10 +24,6 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.primitives import QUARTER_PI, mass_flux
 from epv_env.plant.simulate import energised, simulate
 
-OUTER_GAINS = np.geomspace(3.0, 1e-2, 40)
-"""Outer gains that are tried, the largest first [1]."""
-FREQUENCIES = 400
-"""Number of frequencies at which the loop's margins are read."""
 OPENING = 0.05
 """Share of the stroke at which the plant is linearised [1]: barely open, where the loop works."""
 
@@ -80,11 +75,6 @@ def switching_lag(p: Parameters, *, p1: float, p2: float, supply_voltage: float)
     return float(answered - released) * sampling
 
 
-def _root(function: Callable[[float], float], low: float, high: float) -> float:
-    """Zero of a function that changes sign between low and high."""
-    return float(root_scalar(function, bracket=(low, high)).root)
-
-
 def linearise(p: Parameters, *, p1: float, p2: float, opening: float = OPENING) -> OperatingPoint:
     """The averaged plant at a supply p1 and circuit pressure p2 [Pa absolute].
 
@@ -92,8 +82,9 @@ def linearise(p: Parameters, *, p1: float, p2: float, opening: float = OPENING) 
     """
     c = Coefficients(*coefficients(p)[:, 0].tolist())
     stroke = opening * c.xPVmax
-    p3 = _root(lambda x: _static_stroke(x, p1, p2, c) - stroke, c.p_env, p1)
-    duty = _root(lambda d: _p3_rate(p3, d, p1, c), 0.0, 1.0)
+    opens = root_scalar(lambda x: _static_stroke(x, p1, p2, c) - stroke, bracket=(c.p_env, p1))
+    p3 = float(opens.root)
+    duty = float(root_scalar(lambda d: _p3_rate(p3, d, p1, c), bracket=(0.0, 1.0)).root)
     small = 1e-3 * p3
     flux = mass_flux(p1, p2, c.inverse_sqrt_RT)
     opening_slope = -c.piston_area / c.cPV  # of the static stroke between its stops
@@ -152,18 +143,6 @@ def outer_loop(
     return -pi * closed(z)
 
 
-def response(
-    point: OperatingPoint,
-    inner_gain: float,
-    integral_time: float,
-    period: float,
-) -> control.FrequencyResponseData:
-    """`outer_loop` from 0.1 rad/s to half the sampling frequency, as python-control takes it."""
-    frequency = np.geomspace(0.1, np.pi / period, FREQUENCIES)
-    z = np.exp(1j * frequency * period)
-    return control.frd(outer_loop(point, inner_gain, integral_time, period, z), frequency)
-
-
 def design(
     p: Parameters,
     *,
@@ -194,8 +173,10 @@ def design(
     pole, drift = np.exp(-period / inner_time), np.exp(point.a * period)
     lag = switching_lag(p, p1=p1, p2=p2, supply_voltage=supply_voltage)
     inner_gain = float((drift - pole) / ((drift - 1) / point.a * point.b / BAR))
-    unit = response(point, inner_gain, integral_time, period)
-    for gain in OUTER_GAINS:
+    frequency = np.geomspace(0.1, np.pi / period, 400)  # up to half the sampling frequency [rad/s]
+    z = np.exp(1j * frequency * period)
+    unit = control.frd(outer_loop(point, inner_gain, integral_time, period, z), frequency)
+    for gain in np.geomspace(3.0, 1e-2, 40):
         margin, phase, _, crossover = map(float, control.margin(gain * unit))
         if margin > 1 and phase >= phase_margin:
             return Design(

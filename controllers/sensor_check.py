@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from controllers.base import compiled, composed, in_unit
 from controllers.hysteresis import two_points
-from controllers.knowledge import above_band
 from epv_env.observation import CENTRE, HISTORY, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE
 from epv_env.plant.channels import CURRENT, P1, P2, P3, Sensor
 
@@ -188,8 +187,6 @@ def checked(s, observation, ends, thresholds, period):
 @compiled
 def overruled(s, action):
     """What the coil does, 0 (off) or 1 (on), if the policy wants `action`."""
-    if above_band(s.now[_P2] - s.now[_TARGET]):
-        return 1.0  # whoever decides
     if s.begun == 0 or (s.failed > 0 and s.blind > 0):
         return 1.0  # there is nothing to decide by
     return s.fallback if s.failed > 0 else action

@@ -75,36 +75,29 @@ _STATE = (
 )  # fmt: skip
 
 
-def _learnt() -> tuple[Quantity, ...]:
-    def quantity(name: str, unit: str, scale: float, limit: float, centre: float = 0.0) -> Quantity:
-        return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
-
-    return (
-        quantity("offset", "bar", 0.5, 8.0),  # of the opening pressure from the table's
-        quantity("offset_deviation", "bar", 0.5, 8.0),
-        quantity("gain", "1", 0.2, 8.0, centre=1.0),  # rise of a pulse over the table's
-        quantity("gain_deviation", "1", 0.2, 8.0),
-        quantity("pace", "1", 0.2, 8.0, centre=1.0),  # venting rate over the table's
-        quantity("pace_deviation", "1", 0.2, 8.0),
-        quantity("error", "bar", 0.5, 4.0),  # p2 - target, filtered while the valve is shut
-        quantity("fall", "bar/s", 2.0, 4.0),  # rate of change of p2 by consumption, at most 0
-        quantity("opens_in", "s", 0.05, 2.0),  # with the coil off from now; negative: it is open
-        quantity("opens_in_early", "s", 0.05, 2.0),  # the same if the valve opens early
-        quantity("opens_from_rest", "s", 0.05, 2.0, centre=0.05),  # from a full control chamber
-        quantity("forecast", "bar", 0.5, 4.0),  # p2 - target at the opening, if the coil goes off now
-        quantity("under_way", "bar", 0.3, 4.0),  # rise of p2 if the coil is switched on now
-        quantity("after_period", "bar", 0.3, 4.0),  # the same after one period more off
-        quantity("after_period_early", "bar", 0.3, 4.0),  # the same if the valve opens early
-        quantity("reserve", "bar", 0.1, 4.0),  # how much higher p2 is held where the valve is slow
-        quantity("deepest", "bar", 0.25, 4.0),  # deepest breakdown lately
-        quantity("head", "bar", 2.0, 2.0),  # p1 - p2
-        quantity("margin", "bar", 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
-        quantity("remaining", "s", 0.02, 2.0),
-        quantity("advised", "1", 0.5, 1.0, centre=0.5),
-    )
-
-
-LEARNT = _learnt()
+LEARNT = (
+    Quantity("offset", "bar", 0.0, 0.5, 8.0),  # of the opening pressure from the table's
+    Quantity("offset_deviation", "bar", 0.0, 0.5, 8.0),
+    Quantity("gain", "1", 1.0, 0.2, 8.0),  # rise of a pulse over the table's
+    Quantity("gain_deviation", "1", 0.0, 0.2, 8.0),
+    Quantity("pace", "1", 1.0, 0.2, 8.0),  # venting rate over the table's
+    Quantity("pace_deviation", "1", 0.0, 0.2, 8.0),
+    Quantity("error", "bar", 0.0, 0.5, 4.0),  # p2 - target, filtered while the valve is shut
+    Quantity("fall", "bar/s", 0.0, 2.0, 4.0),  # rate of change of p2 by consumption, at most 0
+    Quantity("opens_in", "s", 0.0, 0.05, 2.0),  # with the coil off from now; negative: it is open
+    Quantity("opens_in_early", "s", 0.0, 0.05, 2.0),  # the same if the valve opens early
+    Quantity("opens_from_rest", "s", 0.05, 0.05, 2.0),  # from a full control chamber
+    Quantity("forecast", "bar", 0.0, 0.5, 4.0),  # p2 - target at the opening, if the coil goes off now
+    Quantity("under_way", "bar", 0.0, 0.3, 4.0),  # rise of p2 if the coil is switched on now
+    Quantity("after_period", "bar", 0.0, 0.3, 4.0),  # the same after one period more off
+    Quantity("after_period_early", "bar", 0.0, 0.3, 4.0),  # the same if the valve opens early
+    Quantity("reserve", "bar", 0.0, 0.1, 4.0),  # how much higher p2 is held where the valve is slow
+    Quantity("deepest", "bar", 0.0, 0.25, 4.0),  # deepest breakdown lately
+    Quantity("head", "bar", 0.0, 2.0, 2.0),  # p1 - p2
+    Quantity("margin", "bar", 0.0, 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
+    Quantity("remaining", "s", 0.0, 0.02, 2.0),
+    Quantity("advised", "1", 0.5, 0.5, 1.0),
+)
 """What is known of a valve, as a policy sees it; the advice last."""
 
 VALVE = np.dtype((np.record,

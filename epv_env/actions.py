@@ -100,12 +100,12 @@ def _numbers(actions: Any) -> NDArray:
     """Actions (n,) or (n, 1) of any real type as float64, (n,). Raises ActionError."""
     check_unmasked(actions)
     try:
-        found = np.asarray(actions)
+        array = np.asarray(actions)
     except ValueError:  # of several lengths
-        found = np.empty(0, dtype=object)
-    if not (found.dtype.kind in "biuf" and found.ndim in (1, 2) and found.size == len(found)):
+        array = np.empty(0, dtype=object)
+    if not (array.dtype.kind in "biuf" and array.ndim in (1, 2) and array.size == len(array)):
         raise ActionError(f"actions {shown(actions)}: give one number for each valve")
-    return found.astype(np.float64).reshape(len(found))
+    return array.astype(np.float64).reshape(len(array))
 
 
 @numba.njit(cache=True)

@@ -116,80 +116,64 @@ def under_conditions(start: Start, conditions: Conditions) -> Start:
     chances = np.random.default_rng((start.seed, STREAM)).random(len(PROBABILITIES))
     for k, (name, chance) in enumerate(zip(PROBABILITIES, chances, strict=True)):
         if chance < getattr(conditions, name):
-            start = _CHANGES[name](start, conditions, np.random.default_rng((start.seed, STREAM, k)))
+            rng = np.random.default_rng((start.seed, STREAM, k))
+            start = replace(start, **_CHANGES[name](start, conditions, rng))
     return start
 
 
-def _starved(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+def _starved(start: Start, c: Conditions, rng: np.random.Generator) -> dict[str, Any]:
     """p1 near the target, and p2 no higher than p1: the valve would let it back."""
     p1 = max(start.target - rng.uniform(*c.starved_bar), c.least_p2_bar)
     supply = Supply.starved(p1, refill_s=rng.uniform(*c.starved_s))
-    return replace(start, supply=supply, p1=p1 * BAR, p3=p1 * BAR, p2=min(start.p2, p1 * BAR))
+    return {"supply": supply, "p1": p1 * BAR, "p3": p1 * BAR, "p2": min(start.p2, p1 * BAR)}
 
 
-def _far(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+def _far(start: Start, c: Conditions, rng: np.random.Generator) -> dict[str, Any]:
     full = max(min(start.target, start.p1 / BAR), c.least_p2_bar)
-    return replace(start, p2=rng.uniform(c.least_p2_bar, full) * BAR)
+    return {"p2": rng.uniform(c.least_p2_bar, full) * BAR}
 
 
-def _vented(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+def _vented(start: Start, c: Conditions, rng: np.random.Generator) -> dict[str, Any]:
     p2 = max(start.target - rng.uniform(*c.vented_drop_bar), c.least_p2_bar) * BAR
-    return replace(start, p2=min(p2, start.p1), p3=start.parameters["p_env"], coil=False)
+    return {"p2": min(p2, start.p1), "p3": start.parameters["p_env"], "coil": False}
 
 
-def _coil_off(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    return replace(start, coil=False)
-
-
-def _rest(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    later = float(np.exp(rng.uniform(*np.log(c.rest_s))))
-    return replace(start, consumption=start.consumption.later(later))
-
-
-def _target_steps(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+def _target_steps(start: Start, c: Conditions, rng: np.random.Generator) -> dict[str, Any]:
     """Steps of the target that the refilled supply can reach."""
     at = np.cumsum(rng.uniform(*c.target_step_s, TARGET_STEPS))
     to = start.target + np.cumsum(rng.uniform(*c.target_step_bar, TARGET_STEPS))
     reachable = max(start.supply.lasting / BAR, start.target)
-    return replace(start, target_steps_at=at, target_steps_to=np.clip(to, c.least_p2_bar, reachable))
+    return {"target_steps_at": at, "target_steps_to": np.clip(to, c.least_p2_bar, reachable)}
 
 
-def _noisy(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    return replace(start, noise_factor=rng.uniform(*c.noise_factor))
-
-
-def _frozen_p3(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    return replace(start, p3_frozen_at=rng.uniform(*c.frozen_p3_s))
-
-
-def _worn(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
+def _worn(start: Start, c: Conditions, rng: np.random.Generator) -> dict[str, Any]:
     count = rng.integers(1, c.most_effects, endpoint=True)
     chosen = rng.choice(len(WORN), size=count, replace=False)
     sizes = {size.symbol: size.draw(rng, size.mild) for k in chosen for size in WORN[k]}
-    return replace(start, parameters=start.parameters.replace(**sizes))
+    return {"parameters": start.parameters.replace(**sizes)}
 
 
-def _biased_p2(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    bias = rng.uniform(*c.bias_p2_bar) * BAR
-    return replace(start, parameters=start.parameters.replace(b_p2=bias))
-
-
-def _delayed(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    delay = rng.uniform(*c.delay_ms) * 1e-3
-    return replace(start, parameters=start.parameters.replace(t_delay=delay))
-
-
-def _extreme(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    return replace(start, parameters=start.region.towards_ends(start.parameters))
-
-
-def _braking(start: Start, c: Conditions, rng: np.random.Generator) -> Start:
-    return replace(start, consumption=SCENARIOS["emergency"].draw(rng), recorded_consumption=None)
-
-
-_CHANGES: dict[str, Callable[[Start, Conditions, np.random.Generator], Start]] = {
-    "starved": _starved, "far": _far, "vented": _vented, "coil_off": _coil_off, "rest": _rest,
-    "target_steps": _target_steps, "noisy": _noisy, "frozen_p3": _frozen_p3, "worn": _worn,
-    "biased_p2": _biased_p2, "delayed": _delayed, "extreme": _extreme, "braking": _braking,
+_CHANGES: dict[str, Callable[[Start, Conditions, np.random.Generator], dict[str, Any]]] = {
+    "starved": _starved,
+    "far": _far,
+    "vented": _vented,
+    "coil_off": lambda start, c, rng: {"coil": False},
+    "rest": lambda start, c, rng: {
+        "consumption": start.consumption.later(float(np.exp(rng.uniform(*np.log(c.rest_s)))))
+    },
+    "target_steps": _target_steps,
+    "noisy": lambda start, c, rng: {"noise_factor": rng.uniform(*c.noise_factor)},
+    "frozen_p3": lambda start, c, rng: {"p3_frozen_at": rng.uniform(*c.frozen_p3_s)},
+    "worn": _worn,
+    "biased_p2": lambda start, c, rng: {
+        "parameters": start.parameters.replace(b_p2=rng.uniform(*c.bias_p2_bar) * BAR)
+    },
+    "delayed": lambda start, c, rng: {
+        "parameters": start.parameters.replace(t_delay=rng.uniform(*c.delay_ms) * 1e-3)
+    },
+    "extreme": lambda start, c, rng: {"parameters": start.region.towards_ends(start.parameters)},
+    "braking": lambda start, c, rng: {
+        "consumption": SCENARIOS["emergency"].draw(rng), "recorded_consumption": None
+    },
 }  # fmt: skip
-"""By the name of the probability."""
+"""Fields of the start that a condition changes, by the name of its probability."""

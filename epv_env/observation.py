@@ -24,7 +24,7 @@ LONGEST_WAIT = 0.2
 """Time since the last switching at which its observation saturates [s]."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Quantity:
     """One entry of the observation: (value - centre) / scale, clipped to ±limit."""
 
@@ -40,24 +40,17 @@ class Quantity:
     """Largest magnitude of the encoded value [-]."""
 
 
-def _layout() -> tuple[Quantity, ...]:
-    def quantity(name: str, unit: str, centre: float, scale: float, limit: float) -> Quantity:
-        return Quantity(name=name, unit=unit, centre=centre, scale=scale, limit=limit)
-
-    return (
-        quantity("p2_error", P2.unit, 0.0, 0.5, 32.0),
-        quantity("target", P2.unit, 8.0, 4.0, 2.5),
-        quantity("p1", P1.unit, 10.0, 4.0, 2.5),
-        quantity("p3", P3.unit, 8.0, 4.0, 2.5),
-        quantity("I", CURRENT.unit, 0.3, 0.3, 5.0),
-        quantity("action", "1", 0.5, 0.5, 1.0),
-        quantity("since_switching", "s", LONGEST_WAIT / 2, LONGEST_WAIT / 2, 1.0),
-        *(quantity(f"p2_change_{lag}", P2.unit, 0.0, 0.1, 160.0) for lag in P2_LAGS),
-        *(quantity(f"p3_change_{lag}", P3.unit, 0.0, 0.5, 32.0) for lag in P3_LAGS),
-    )
-
-
-LAYOUT = _layout()
+LAYOUT = (
+    Quantity("p2_error", P2.unit, 0.0, 0.5, 32.0),
+    Quantity("target", P2.unit, 8.0, 4.0, 2.5),
+    Quantity("p1", P1.unit, 10.0, 4.0, 2.5),
+    Quantity("p3", P3.unit, 8.0, 4.0, 2.5),
+    Quantity("I", CURRENT.unit, 0.3, 0.3, 5.0),
+    Quantity("action", "1", 0.5, 0.5, 1.0),
+    Quantity("since_switching", "s", LONGEST_WAIT / 2, LONGEST_WAIT / 2, 1.0),
+    *(Quantity(f"p2_change_{lag}", P2.unit, 0.0, 0.1, 160.0) for lag in P2_LAGS),
+    *(Quantity(f"p3_change_{lag}", P3.unit, 0.0, 0.5, 32.0) for lag in P3_LAGS),
+)
 """Entries of the observation in their order."""
 
 INDEX = {quantity.name: row for row, quantity in enumerate(LAYOUT)}

@@ -1,8 +1,7 @@
 """One control period of a batch in one compiled call: drive, integrate, judge, measure, observe.
 
 The rules are functions of one episode, e, a record of EPISODE; rules: a record of RULES. The compiled
-steps at the end call them for all. These take the same arguments, n episodes in `lanes` lanes of the
-plant's tables:
+step at the end calls them for all, n episodes in `lanes` lanes of the plant's tables:
 
 episodes, progress: records of EPISODE (n,) and PROGRESS (n,). rules: a record of RULES (1,).
 noise: standard normal draws times the task's factor, (n, NOISE_BLOCK, 4).
@@ -12,7 +11,8 @@ of the part with the coil on, if there is one, and of the part with it off.
 record: empty. step: largest integration step [s].
 on_time (n,) [s], action (n,) [-]: what is commanded.
 figures (N_FIGURE, n), observation (n, entries) float32: results.
-first, last: lanes, multiples of LANES.
+first, last: lanes, multiples of LANES. begins, ends: whether to begin and to end the period; valves are
+integrated in between only if both, so they must be nominal.
 """
 
 import math
@@ -44,7 +44,7 @@ from epv_env.plant.lanes import N_STATE, STATE, state_at
 from epv_env.plant.primitives import exact, generated, source_digest, wide_vectors
 from epv_env.plant.supply import two_point
 from epv_env.result import CONSUMPTION, DEVIATION, FAILED, N_TERM, REWARD, SUCCEEDED, SWITCHINGS, VENTED
-from epv_env.reward import BAND_BAR, EMPTY_CIRCUIT_BAR, RewardWeights, priced, total
+from epv_env.reward import BAND_BAR, EMPTY_CIRCUIT_BAR, RewardWeights, reward_terms, total
 from epv_env.settings import Settings
 
 # np.record: the fields are attributes where numba's simulator runs the functions as plain Python, too.
@@ -79,7 +79,7 @@ RULES = np.dtype((np.record, [(name, np.float64) for name in _RULES]))
 """Record of the settings that a period needs, by their names."""
 
 _digitised, _two_point, _scaled = exact(digitised), exact(two_point), exact(scaled)
-_priced, _total = exact(priced), exact(total)
+_reward_terms, _total = exact(reward_terms), exact(total)
 
 _SENSOR = np.array([CHANNEL[name].sensor.constants() for name in MEASURED])
 _P1, _P2, _P3, _I = (MEASURED.index(name) for name in ("p1", "p2", "p3", "I"))
@@ -148,7 +148,7 @@ def judge(e, rules, p2, lowest, highest, vented, figures, i):
     failed = figures[FAILED, i] != 0.0 or p2 <= _EMPTY
     settled = e.steps * rules.control_period > rules.settling_time
     e.violated |= settled and abs(deviation) > BAND_BAR
-    terms = _priced(
+    terms = _reward_terms(
         rules, rules.control_period, error, above, below, figures[SWITCHINGS, i], vented, failed
     )
     for row in range(N_TERM):
@@ -179,14 +179,6 @@ def remember(e):
         e.p3_history[k] = e.p3_history[k - 1]
     e.p2_history[0] = e.reading[_P2]
     e.p3_history[0] = e.reading[_P3]
-
-
-@exact
-def remember_only(e):
-    """Let the past of an episode that has just begun be its present."""
-    for k in range(HISTORY):
-        e.p2_history[k] = e.reading[_P2]
-        e.p3_history[k] = e.reading[_P3]
 
 
 @exact
@@ -289,43 +281,28 @@ _DIGEST = source_digest(*(Path(__file__).with_name(f"{name}.py") for name in INL
 
 
 def _compiled(digest):
-    """The step as a whole for nominal valves, and its two ends for others."""
+    """The step of valves, and the start of episodes."""
 
     def compiled(function: Callable[..., None]) -> Callable[..., None]:
         return numba.njit(function, cache=True, nogil=True, error_model="numpy")
 
     @compiled
-    def whole(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest, sensors,
-              before, inputs, duration, record, step, on_time, action, figures, observation, first,
-              last):  # fmt: skip
+    def advance(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
+                sensors, before, inputs, duration, record, step, on_time, action, figures, observation,
+                first, last, begins, ends):  # fmt: skip
         if digest == "":  # keeps the digest in the closure
             return
         wide_vectors()  # the preference of run_nominal is lost where that is inlined here
-        begin_period(episodes, progress, rules, state, before, inputs, duration, lowest, highest,
-                     on_time, action, figures, first, last)  # fmt: skip
-        parts = 2 if np.any(duration[1, first:last] > 0.0) else 1
-        run_nominal(state, coefficients, effects, inputs[:parts], duration[:parts], lowest, highest,
-                    record, step, first, last)  # fmt: skip
-        end_period(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
-                   observation, first, last)  # fmt: skip
-
-    @compiled
-    def prepare(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
-                sensors, before, inputs, duration, record, step, on_time, action, figures, observation,
-                first, last):  # fmt: skip
-        if digest == "":
-            return
-        begin_period(episodes, progress, rules, state, before, inputs, duration, lowest, highest,
-                     on_time, action, figures, first, last)  # fmt: skip
-
-    @compiled
-    def conclude(episodes, progress, rules, noise, state, coefficients, effects, lowest, highest,
-                 sensors, before, inputs, duration, record, step, on_time, action, figures, observation,
-                 first, last):  # fmt: skip
-        if digest == "":
-            return
-        end_period(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
-                   observation, first, last)  # fmt: skip
+        if begins:
+            begin_period(episodes, progress, rules, state, before, inputs, duration, lowest, highest,
+                         on_time, action, figures, first, last)  # fmt: skip
+        if begins and ends:
+            parts = 2 if np.any(duration[1, first:last] > 0.0) else 1
+            run_nominal(state, coefficients, effects, inputs[:parts], duration[:parts], lowest, highest,
+                        record, step, first, last)  # fmt: skip
+        if ends:
+            end_period(episodes, rules, noise, state, before, lowest, highest, sensors, figures,
+                       observation, first, last)  # fmt: skip
 
     @compiled
     def begin(episodes, noise, state, sensors, where, observation):
@@ -333,11 +310,12 @@ def _compiled(digest):
             return
         for i in where:
             measure(episodes[i], state_at(state, STATE, i), sensors[i], noise[i, 0], 0.0)
-            remember_only(episodes[i])
+            for _ in range(HISTORY):  # the past of an episode that has just begun is its present
+                remember(episodes[i])
         for i in range(len(episodes)):
             observe(episodes[i], observation[i])
 
-    return whole, prepare, conclude, begin
+    return advance, begin
 
 
-step_whole, step_prepare, step_conclude, observe_first = _compiled(_DIGEST)
+step_period, observe_first = _compiled(_DIGEST)

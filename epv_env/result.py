@@ -55,7 +55,6 @@ KEYS = (
     "is_success",
 )
 """In the order of the figures of a StepResult."""
-_SHOWN = SUCCEEDED + 1
 
 TRUTH_KEYS = ("true_state", "parameters")
 """Keys that an environment made with `privileged=True` shows besides."""
@@ -82,7 +81,7 @@ def step_info(result: StepResult) -> dict[str, Any]:
     the period; "switchings" of the coil; "vented_g": air blown off [g]; "consumption_g_per_s";
     "is_success": settled and inside ±500 mbar ever since.
     """
-    info: dict[str, Any] = dict(zip(KEYS, result.figures[:_SHOWN], strict=True))
+    info: dict[str, Any] = dict(zip(KEYS, result.figures[: SUCCEEDED + 1], strict=True))
     info["switchings"] = result.switchings
     info["vented_g"] = 1e3 * result.figures[VENTED]
     info["consumption_g_per_s"] = 1e3 * result.consumption

@@ -68,23 +68,30 @@ class RewardTerms(NamedTuple):
     failure: NDArray
     """End of the episode by an empty circuit."""
 
-    def total(self) -> NDArray:
-        """The reward, the sum of all terms, (n,) [-]."""
-        return total(self)
-
 
 def total(terms):
-    """Sum of RewardTerms [-]. The step compiles this function."""
+    """Sum of RewardTerms, the reward, of any shape [-]. The step compiles this function."""
     return (
         terms.band + terms.tracking + terms.breakdown + terms.switching + terms.vented_air
         + terms.failure
     )  # fmt: skip
 
 
-def priced(
+def reward_terms(
     weights, period, error_bar, highest_error_bar, lowest_error_bar, switchings, vented_kg, failed
 ):
-    """`reward_terms` of numbers or arrays, by position. The step compiles this function."""
+    """RewardTerms of one control period, of numbers or arrays (n,). The step compiles this function.
+
+    Args:
+        weights: RewardWeights, or a record with its fields.
+        period: control period [s].
+        error_bar: p2 - target at the end of the period [bar].
+        highest_error_bar: its greatest value within the period [bar].
+        lowest_error_bar: its least value within the period [bar].
+        switchings: of the coil.
+        vented_kg: air blown off [kg].
+        failed: whether the circuit is empty.
+    """
     scale = period / REFERENCE_PERIOD
     outside = np.maximum(highest_error_bar, -lowest_error_bar) > weights.band_bar
     shortfall = np.maximum(-lowest_error_bar, 0.0)
@@ -95,32 +102,4 @@ def priced(
         switching=-weights.switching * switchings,
         vented_air=-weights.vented_air * 1e3 * vented_kg,
         failure=-weights.failure * failed,
-    )
-
-
-def reward_terms(
-    weights: RewardWeights,
-    *,
-    period: float,
-    error_bar: NDArray,
-    highest_error_bar: NDArray,
-    lowest_error_bar: NDArray,
-    switchings: NDArray,
-    vented_kg: NDArray,
-    failed: NDArray,
-) -> RewardTerms:
-    """Reward terms of one control period, each (n,) [-].
-
-    Args:
-        weights: weights of the terms and the band.
-        period: control period [s].
-        error_bar: p2 - target at the end of the period, (n,) [bar].
-        highest_error_bar: its greatest value within the period, (n,) [bar].
-        lowest_error_bar: its least value within the period, (n,) [bar].
-        switchings: switchings of the coil, (n,).
-        vented_kg: air blown off, (n,) [kg].
-        failed: whether the circuit is empty, boolean (n,).
-    """
-    return priced(
-        weights, period, error_bar, highest_error_bar, lowest_error_bar, switchings, vented_kg, failed
     )

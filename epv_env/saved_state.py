@@ -120,9 +120,9 @@ def restore_state(env: gymnasium.Env | gymnasium.vector.VectorEnv, saved: SavedS
         generators = [np.random.default_rng(0) for _ in saved.generators]
         for rng, state in zip(generators, saved.generators, strict=True):
             rng.bit_generator.state = json.loads(state)
-        signals: list[Any] = [tuple(each) for each in saved.signals]
+        signals: list[Any] = [tuple(followed) for followed in saved.signals]
         if (len(signals), len(generators)) != (task.n, task.n + len(rngs)) or not all(
-            len(each) == 3 and all(map(isinstance, each, FOLLOWED)) for each in signals
+            len(followed) == 3 and all(map(isinstance, followed, FOLLOWED)) for followed in signals
         ):
             raise ValueError("generators or signals of other episodes")
     except Exception as error:  # of many kinds: the above, NumPy's and JSON's
@@ -134,8 +134,8 @@ def restore_state(env: gymnasium.Env | gymnasium.vector.VectorEnv, saved: SavedS
         task.memory[name][...] = arrays[name]
     task.signals[:] = signals
     task.noise_of[:] = generators[: task.n]
-    for rng, found in zip(rngs, generators[task.n :], strict=True):
-        rng.bit_generator.state = found.bit_generator.state
+    for rng, restored in zip(rngs, generators[task.n :], strict=True):
+        rng.bit_generator.state = restored.bit_generator.state
     task.settle()
     if isinstance(valves, _ValveVectorEnv):
         valves._done = arrays["_done"].copy()

@@ -42,7 +42,7 @@ def _plain(value: Any) -> Any:
     """Arrays and pairs as lists; whole numbers beyond a float's range infinite: no domain holds them."""
     value = value.tolist() if isinstance(value, np.ndarray) else value
     if isinstance(value, (list, tuple)):
-        return [_plain(each) for each in value]
+        return [_plain(entry) for entry in value]
     return np.inf if isinstance(value, int) and abs(value) > LARGEST else value
 
 
@@ -57,7 +57,7 @@ def as_region(value: Any, plant: Plant) -> Region | Mixture:
     if isinstance(value, Parameters):
         return Region(centre=value)
     if isinstance(value, Mapping):
-        return Region.from_choices(_choices(value), plant.parameters)
+        return Region(centre=plant.parameters).changed(_choices(value))
     if not isinstance(value, str):
         raise OptionError(
             f"parameters is {shown(value)}: give the name of a region, a mapping of values and "
@@ -132,15 +132,15 @@ def as_effects(value: Any) -> dict[str, Any]:
     if not isinstance(value, Mapping):
         raise OptionError(f"effects is {shown(value)}: give a mapping from an effect's name to its size")
     sizes: dict[str, Any] = {}
-    for name, given in value.items():
+    for name, size in value.items():
         symbols = effect(name).symbols
-        own = given if isinstance(given, Mapping) else dict.fromkeys(symbols, given)
-        if (not isinstance(given, Mapping) and len(symbols) > 1) or set(own) - set(symbols):
+        by_symbol = size if isinstance(size, Mapping) else dict.fromkeys(symbols, size)
+        if (not isinstance(size, Mapping) and len(symbols) > 1) or set(by_symbol) - set(symbols):
             raise OptionError(
                 f"effect {name} is sized by {', '.join(symbols)}: give a mapping from these symbols to "
                 "values or (low, high)"
             )
-        sizes |= _choices(own)
+        sizes |= _choices(by_symbol)
     return sizes
 
 
@@ -266,6 +266,6 @@ def with_options(settings: Settings, options: Mapping[str, Any], plant: Plant) -
     """The settings of one episode. Raises OptionError for an unknown key."""
     check_known("reset option", options, OPTIONS)
     others = [entry.name for entry in fields(Settings) if entry.name not in ("region", "effects")]
-    own = {"parameters": settings.region, **{name: getattr(settings, name) for name in others}}
-    made = make_settings(plant, **{**own, **options})
+    unchanged = {"parameters": settings.region, **{name: getattr(settings, name) for name in others}}
+    made = make_settings(plant, **{**unchanged, **options})
     return made if "effects" in options else replace(made, effects=settings.effects)

@@ -33,9 +33,9 @@ def check_count(name: str, value: Any, least: int = 1, most: int = 10**9) -> Non
         raise OptionError(f"{name} = {shown(value)}: give a whole number from {least} to {most}")
 
 
-def check_known(what: str, given: Iterable[Any], known: Collection[str]) -> None:
+def check_known(what: str, names: Iterable[Any], known: Collection[str]) -> None:
     """Raises OptionError for a name that is not among the known ones. what: the kind of name."""
-    for name in given:
+    for name in names:
         if name not in known:
             raise OptionError(f"unknown {what} {shown(name)}: known are {', '.join(known)}")
 
@@ -98,10 +98,6 @@ def _limits(dataclass: type) -> dict[str, Any]:
     return {name: get_args(h) for name, h in hints.items() if get_origin(h) is Annotated}
 
 
-LONGEST_SIGNAL = 10_000_000
-"""Samples, at most: more is a slip, and would fill the memory."""
-
-
 class SignalError(ValueError):
     """A signal cannot be used: the message says which, the rule and the remedy."""
 
@@ -142,20 +138,20 @@ class MovingTarget:
         Raises SignalError for one outside the limits [bar absolute], or that is no number.
         """
         try:
-            found = np.array([real(self.at(seconds)) for seconds in time.tolist()])
+            targets = np.array([real(self.at(seconds)) for seconds in time.tolist()])
         except TypeError as error:
             raise SignalError(
                 f"the target at {time[0]:g} s is no number ({error}): give a function of the time [s] "
                 "that returns bar absolute"
             ) from error
-        wrong = ~((found >= limits[0]) & (found <= limits[1]))  # true for NaN, too
+        wrong = ~((targets >= limits[0]) & (targets <= limits[1]))  # true for NaN, too
         if np.any(wrong):
             k = int(np.argmax(wrong))
             raise SignalError(
-                f"the target is {found[k]:g} bar at {time[k]:g} s: keep it between {limits[0]:g} and "
+                f"the target is {targets[k]:g} bar at {time[k]:g} s: keep it between {limits[0]:g} and "
                 f"{limits[1]:g} bar absolute"
             )
-        return found
+        return targets
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -181,7 +177,8 @@ class RecordedConsumption:
                 f"a recorded consumption is {flow[k] / GRAM:g} g/s at {time[k]:g} s: give flows of at "
                 "least 0, since consumers draw air"
             )
-        vars(self).update(time=time, flow=flow, _taken=_integral(time, flow))
+        taken = np.concatenate([[0.0], np.cumsum(np.diff(time) * (flow[1:] + flow[:-1]) / 2)])
+        vars(self).update(time=time, flow=flow, _taken=taken)  # [kg] until each sample
 
     def mean_flow(self, time: NDArray, period: float) -> NDArray:
         """Mean flow (n,) [kg/s] over the period [s] that starts at each time (n,) [s]."""
@@ -209,13 +206,8 @@ class Signals(NamedTuple):
 
 def shared(signals: Sequence[Signal | None]) -> list[tuple[Signal, NDArray]]:
     """Each signal once, with the indices of the episodes that have it, (m,)."""
-    found = {id(signal): signal for signal in signals if signal is not None}
-    return [(each, np.flatnonzero([one is each for one in signals])) for each in found.values()]
-
-
-def _integral(time: NDArray, flow: NDArray) -> NDArray:
-    """Air drawn until each sample (samples,) [kg]."""
-    return np.concatenate([[0.0], np.cumsum(np.diff(time) * (flow[1:] + flow[:-1]) / 2)])
+    once = {id(signal): signal for signal in signals if signal is not None}
+    return [(signal, np.flatnonzero([s is signal for s in signals])) for signal in once.values()]
 
 
 def _samples(what: str, time: ArrayLike, values: ArrayLike) -> tuple[NDArray, NDArray]:
@@ -224,7 +216,7 @@ def _samples(what: str, time: ArrayLike, values: ArrayLike) -> tuple[NDArray, ND
         t, v = np.array(time, dtype=float), np.array(values, dtype=float)
     except (TypeError, ValueError, OverflowError):
         raise SignalError(f"{what} needs numbers: give two lists of them") from None
-    if t.ndim != 1 or t.shape != v.shape or not 0 < t.size <= LONGEST_SIGNAL:
+    if t.ndim != 1 or t.shape != v.shape or not 0 < t.size <= 10_000_000:  # more is a slip
         raise SignalError(f"{what} has shapes {t.shape} and {v.shape}: give a value for each time")
     if not (np.all(np.isfinite(t)) and np.all(np.isfinite(v)) and np.all(np.diff(t) > 0)):
         raise SignalError(f"{what} needs increasing times and finite values: leave other samples out")

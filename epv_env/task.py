@@ -19,9 +19,7 @@ from epv_env.period import (
     NOISE_BLOCK,
     observe_first,
     rules_of,
-    step_conclude,
-    step_prepare,
-    step_whole,
+    step_period,
 )
 from epv_env.plant.channels import MEASURED
 from epv_env.plant.consumption import Profiles
@@ -82,11 +80,6 @@ class LimitingTask:
         return self._episodes["steps"]
 
     @property
-    def compressor(self) -> NDArray:
-        """Whether it runs, boolean (n,)."""
-        return self._episodes["compressor"]
-
-    @property
     def coil(self) -> NDArray:
         """Whether it is on at the end of the last period, boolean (n,)."""
         return self._episodes["coil"]
@@ -94,11 +87,10 @@ class LimitingTask:
     @property
     def memory(self) -> dict[str, NDArray]:
         """The arrays, by name, in which the episodes keep their past (see `Valves.memory`)."""
-        own = {
+        return {
             "episodes": self._episodes, "progress": self.consumption.progress, "noise": self._noise,
-            "parameter_values": self.parameter_values, "volumes": self.volumes,
+            "parameter_values": self.parameter_values, "volumes": self.volumes, **self.valves.memory,
         }  # fmt: skip
-        return {**own, **self.valves.memory}
 
     def settle(self) -> None:
         """Take note of what `memory` and `signals` hold now."""
@@ -172,20 +164,17 @@ class LimitingTask:
         arguments = (*self._fixed, on_time, action, figures, observation)
         lanes, threads = self._inputs.shape[2], self.valves.threads
         if self.valves.nominal:
-            share(lambda first, last: step_whole(*arguments, first, last), lanes, threads=threads)
+            share(lambda *ends: step_period(*arguments, *ends, True, True), lanes, threads=threads)
         else:
-            step_prepare(*arguments, 0, lanes)
-            self._drive()
-            step_conclude(*arguments, 0, lanes)
+            step_period(*arguments, 0, lanes, True, False)
+            # the part of the period with the coil on, then the part with it off
+            for inputs, duration in zip(self._inputs, self._duration[:, : self.n], strict=True):
+                if np.any(duration):
+                    for field, values in zip(self.valves.inputs, inputs, strict=True):
+                        field[:] = values[: self.n]
+                    self.valves.advance(duration)
+            step_period(*arguments, 0, lanes, False, True)
         return StepResult(observation, figures)
-
-    def _drive(self) -> None:
-        """Advance valves with effects through the part with the coil on, then the part with it off."""
-        for inputs, duration in zip(self._inputs, self._duration[:, : self.n], strict=True):
-            if np.any(duration):
-                for field, values in zip(self.valves.inputs, inputs, strict=True):
-                    field[:] = values[: self.n]
-                self.valves.advance(duration)
 
     def _set_plants(self, where: NDArray, starts: Sequence[Start]) -> None:
         """Give the valves at `where` their parameters and their first state."""

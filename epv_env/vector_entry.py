@@ -1,5 +1,6 @@
 """What `gymnasium.make_vec` calls: the vector environment on the processor or on an accelerator."""
 
+from functools import partial
 from typing import Any
 
 from epv_env.common.field_types import shown
@@ -42,11 +43,5 @@ def make_vector(
     return OnHost(made) if to_host else made
 
 
-def make_on_off(**arguments: Any) -> Any:
-    """EPValve-v0 for `gymnasium.make_vec`; arguments as of EPValveVectorEnv, and `make_vector`."""
-    return make_vector(EPValveVectorEnv, **arguments)
-
-
-def make_pwm(**arguments: Any) -> Any:
-    """EPValvePWM-v0 for `gymnasium.make_vec`; arguments as of EPValvePWMVectorEnv, and `make_vector`."""
-    return make_vector(EPValvePWMVectorEnv, **arguments)
+make_on_off, make_pwm = (partial(make_vector, e) for e in (EPValveVectorEnv, EPValvePWMVectorEnv))
+"""EPValve-v0 and EPValvePWM-v0 for `gymnasium.make_vec`."""

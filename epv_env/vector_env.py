@@ -17,14 +17,11 @@ from epv_env.settings import as_plant, checked_options, make_settings, with_opti
 from epv_env.signals import OptionError, as_seed, check_count, checked_flag
 from epv_env.task import LimitingTask
 
-MOST_ENVS = 1_000_000
-"""Valves of a batch: more are a slip, and would fill the memory."""
 BATCH = (
     "num_envs", "max_episode_steps", "autoreset_mode", "threads", "device", "to_host", "starts",
     "precision",
 )  # fmt: skip
 """What a batch takes beside the arguments of one environment; the last four: `make_vector`."""
-_MASKS = tuple(f"_{key}" for key in KEYS)
 
 
 def masked_info(result: StepResult, valid: NDArray) -> dict[str, Any]:
@@ -32,7 +29,7 @@ def masked_info(result: StepResult, valid: NDArray) -> dict[str, Any]:
     infos = step_info(result)
     if not valid.all():
         infos = {key: np.where(valid, value, 0).astype(value.dtype) for key, value in infos.items()}
-    return infos | dict.fromkeys(_MASKS, valid)
+    return infos | {f"_{key}": valid for key in KEYS}
 
 
 def keep_final(infos: dict[str, Any], observation: NDArray, ended: NDArray) -> None:
@@ -82,7 +79,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ):
-        check_count("num_envs", num_envs, most=MOST_ENVS)
+        check_count("num_envs", num_envs, most=1_000_000)  # more are a slip, and would fill the memory
         if threads is not None:
             check_count("threads", threads)
         if render_mode is not None:
@@ -179,16 +176,15 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
 
     def _begin(self, where: NDArray, options: dict[str, Any]) -> NDArray:
         """Start the episodes at `where` and return all observations."""
-        settings = [
-            with_options(self.settings, self._own(options, i), self.plant) if options else self.settings
-            for i in where
-        ]
+        settings = [self.settings] * len(where)
+        if options:
+            settings = [with_options(self.settings, self._chosen(i, options), self.plant) for i in where]
         self._done = self._done.copy()
         self._done[where] = False
         self._some_done = bool(self._done.any())
         return self.task.begin(where, [self._rngs[i] for i in where], settings)
 
-    def _own(self, options: dict[str, Any], i: int) -> dict[str, Any]:
+    def _chosen(self, i: int, options: dict[str, Any]) -> dict[str, Any]:
         """The options of sub-environment i: lists hold one value for each."""
         for key, value in options.items():
             if isinstance(value, list) and len(value) != self.num_envs:
@@ -196,8 +192,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
                     f"option {key} lists {len(value)} values for {self.num_envs} environments: "
                     "give one each, or one (low, high) tuple for all"
                 )
-        own = {k: value[i] if isinstance(value, list) else value for k, value in options.items()}
-        return {key: value for key, value in own.items() if value is not None}
+        chosen = {k: value[i] if isinstance(value, list) else value for k, value in options.items()}
+        return {key: value for key, value in chosen.items() if value is not None}
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """One seed for each sub-environment, as SyncVectorEnv gives them."""
@@ -206,7 +202,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
             return [None if first is None else first + i for i in range(self.num_envs)]
         if len(seed) != self.num_envs:
             raise OptionError(f"got {len(seed)} seeds for {self.num_envs} environments: give one each")
-        return [as_seed(each) for each in seed]
+        return [as_seed(value) for value in seed]
 
     def _checked_mask(self, mask: NDArray) -> NDArray:
         if not isinstance(mask, np.ndarray) or mask.shape != (self.num_envs,) or mask.dtype != bool:
@@ -218,7 +214,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
 
 def _checked_mode(mode: Any) -> AutoresetMode:
     """The mode, from itself or its value. Raises OptionError."""
-    known = [each.value for each in AutoresetMode]
+    known = [mode.value for mode in AutoresetMode]
     if isinstance(mode, AutoresetMode) or (isinstance(mode, str) and mode in known):
         return AutoresetMode(mode)
     raise OptionError(f"autoreset_mode = {shown(mode)}: give one of {', '.join(known)}")
@@ -228,10 +224,10 @@ def _checked_limit(limit: Any, n: int) -> Any:
     """The greatest number of steps: None, a number for all, or an array (n,). Raises OptionError."""
     if limit is None:
         return None
-    each = limit if isinstance(limit, (list, tuple)) else [limit]
-    for steps in each:
+    listed = isinstance(limit, (list, tuple))
+    for steps in limit if listed else [limit]:
         check_count("max_episode_steps", steps)
-    if each is not limit:
+    if not listed:
         return limit
     if len(limit) != n:
         raise OptionError(

@@ -96,7 +96,9 @@ sys.meta_path = [Brought if finder is PathFinder else finder for finder in sys.m
 """
 
 
-@pytest.mark.parametrize("extra", PROMISES)
+@pytest.mark.parametrize(
+    "extra", [pytest.param(x, marks=pytest.mark.slow) if x == "research" else x for x in PROMISES]
+)
 def test_an_extra_alone_brings_what_it_promises(extra, tmp_path):
     code = blocker(*filter(None, [extra])) + PROMISES[extra]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "SDL_VIDEODRIVER": "dummy"}

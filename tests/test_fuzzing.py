@@ -124,7 +124,9 @@ FORMATS: dict[str, tuple[Callable[[Path], object], Callable[[Path], object]]] = 
     WEIGHTS_FILE: (_policy, read_policy),
     "recording.csv": (
         _table,
-        lambda folder: read_columns("recording.csv", (folder / "recording.csv").read_bytes()),
+        lambda folder: read_columns(
+            "recording.csv", (folder / "recording.csv").read_bytes(), REQUIRED_COLUMNS
+        ),
     ),
     "monitor.json": (
         lambda folder: white_model().save(folder / "monitor.json"),

@@ -201,12 +201,12 @@ class ClosedLoop:
                 )
         self.before = simulated([self.log] * REPEATS, self.given, self.controller)
 
-    def compared(self, corrected: Plant, first: int = 0) -> Compared:
-        """Against a corrected plant; the drives from number `first` on count."""
+    def compared(self, corrected: Plant, part: slice = slice(None)) -> Compared:
+        """Against a corrected plant; a part of the drives counts."""
         after = simulated([self.log] * REPEATS, corrected, self.controller)
         again = simulated(after, corrected, self.controller)
         logged, before, each, repeated = (
-            np.array([figures(replace(log, drives=log.drives[first:])) for log in logs])
+            np.array([figures(replace(log, drives=log.drives[part])) for log in logs])
             for logs in ([self.log], self.before, after, again)
         )
         error = DEVIATIONS * np.sqrt(np.mean((repeated - each) ** 2, axis=0))
@@ -216,12 +216,13 @@ class ClosedLoop:
     def sections(self, found: Diagnosis, corrected: Plant) -> list[Section]:
         """One section: a sentence and a table, of the drives in which the causes act."""
         files = [drive.file for drive in self.log.drives]
-        first = files.index(found.onset[0]) if found.onset else 0
-        result = self.compared(corrected, first)
+        first = files.index(found.onset.drive) if found.onset else 0
+        end = files.index(found.onset.mended) if found.onset and found.onset.mended else None
+        result = self.compared(corrected, slice(first, end))
         name = f"with {found.kept.title}" if found.kept.labels else "recalibrated"
         caption = (
-            f"Mean over {', '.join(files[first:])}, after {SETTLING:g} s. Simulated: {REPEATS} runs of "
-            f"{self.controller.name} in closed loop. Consumption is read off p2 while the valve is "
+            f"Mean over {', '.join(files[first:end])}, after {SETTLING:g} s. Simulated: {REPEATS} runs "
+            f"of {self.controller.name} in closed loop. Consumption is read off p2 while the valve is "
             f"shut. Own error: what this method may be off by ({DEVIATIONS:g} standard deviations), or "
             "what does not matter; a difference below it counts for nothing. An error that a sensor "
             "hides from the controller is not in its readings."

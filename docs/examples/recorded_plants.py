@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import Diagnosis, diagnose
-from identification.gap.fit.prediction import predict
+from identification.gap.fit.evidence import predict
 from identification.gap.ode_plant import OdePlant
 from identification.gap.plant import Cause, FreeParameter, Run
 from identification.gap.report.gap_json import write_results

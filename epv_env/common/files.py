@@ -7,6 +7,7 @@ import math
 import os
 import re
 import secrets
+import shutil
 import stat
 import zlib
 from collections.abc import Callable, Iterator
@@ -60,6 +61,19 @@ def write_bytes(path: Path, content: bytes) -> None:
     finally:
         with suppress(OSError):
             temporary.unlink()
+
+
+TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
+"""Names of what is being written: hidden, with a random end."""
+
+
+def remove_leftovers(folder: Path) -> None:
+    """Remove what killed writers left in a folder into which nobody else writes."""
+    for path in [path for path in folder.rglob(".*") if TEMPORARY.fullmatch(path.name)]:
+        if path.is_dir():
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)  # it may have gone with its folder
 
 
 def check_writable(path: Path) -> None:

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from filelock import FileLock, Timeout
 
-from epv_env.common.files import checked, decoded, write_json
+from epv_env.common.files import checked, decoded, remove_leftovers, write_json
 
 Shape = TypeVar("Shape")
 
@@ -71,6 +71,8 @@ LOCK_FILE = ".lock"
 def only_writer(folder: Path) -> Iterator[None]:
     """Hold a folder of results alone; it is made if it is missing, and removed again if it stays empty.
 
+    What killed writers left is removed first.
+
     Raises ValueError if another process writes into the folder.
     """
     made = [level for level in (folder, *folder.parents) if not level.exists()]
@@ -84,6 +86,7 @@ def only_writer(folder: Path) -> Iterator[None]:
             f"another process writes into {folder}: wait until it ends, or choose another --out"
         ) from None
     try:
+        remove_leftovers(folder)
         yield
     finally:
         # Removed while it is held: whoever opened it meanwhile sees that it has no name and tries again.

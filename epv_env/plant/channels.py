@@ -15,9 +15,6 @@ from epv_env.plant.equations import State
 from epv_env.plant.parameters import ParameterError
 from epv_env.plant.primitives import ROUNDING, Value
 
-ADC_BITS = 12
-"""Resolution of the data acquisition card (section 3)."""
-
 
 def digitised(value, standard_normal, low, noise, resolution, least, greatest):
     """Reading of a value with noise, in whole steps of the converter from `low` on, within its ends.
@@ -47,8 +44,13 @@ class Sensor:
 
     @property
     def resolution(self) -> float:
-        """One step of the ADC [unit of the sensor]."""
-        return (self.high - self.low) / 2**ADC_BITS
+        """One step of the ADC [unit of the sensor]: 12 bit (section 3)."""
+        return (self.high - self.low) / 2**12
+
+    @property
+    def margin(self) -> float:
+        """Accuracy in the unit of the sensor."""
+        return self.accuracy * self.high
 
     def measure(self, value: NDArray, standard_normal: NDArray) -> NDArray:
         """The readings for true values, any shape [unit of the sensor]; offset and trend not included.
@@ -60,8 +62,8 @@ class Sensor:
 
     def constants(self) -> tuple[float, float, float, float, float]:
         """What `digitised` needs: least value, noise, resolution, least and greatest reading."""
-        margin = self.accuracy * self.high
-        return self.low, self.noise, self.resolution, self.low - margin, self.high + margin
+        ends = self.low - self.margin, self.high + self.margin
+        return self.low, self.noise, self.resolution, *ends
 
 
 Reading = Callable[[State, Mapping[str, Value]], Value]
@@ -98,22 +100,16 @@ class MeasuredChannel:
     """Whether identification fits the channel (y of eq. 4)."""
 
     def __post_init__(self) -> None:
-        for fault in _faults(self):
+        fault = next(
+            (f"{f} is empty: fill it in" for f in ("name", "unit", "columns") if not getattr(self, f)),
+            None,
+        )
+        if self.scale <= 0.0:
+            fault = f"scale is {self.scale:g}: give the size of one {self.unit} in SI units"
+        if self.reading is None and (self.output or self.observed or self.symbols):
+            fault = "an output or observed channel needs `reading`: give a function of the state"
+        if fault:
             raise ChannelError(f"measured channel {self.name!r}: {fault}")
-
-
-def _faults(channel: MeasuredChannel) -> list[str]:
-    """What is missing or wrong in a record, each with its remedy."""
-    faults = [
-        f"{field} is empty: fill it in"
-        for field in ("name", "unit", "columns")
-        if not getattr(channel, field)
-    ]
-    if channel.scale <= 0.0:
-        faults.append(f"scale is {channel.scale:g}: give the size of one {channel.unit} in SI units")
-    if channel.reading is None and (channel.output or channel.observed or channel.symbols):
-        faults.append("an output or observed channel needs `reading`: give a function of the state")
-    return faults
 
 
 P1 = MeasuredChannel(
@@ -212,13 +208,6 @@ SENSORS: dict[str, Sensor] = {channel.name: channel.sensor for channel in MEASUR
 """Table 1's range and accuracy, Table 2's offset and trend, Table 3's standard deviation."""
 
 
-MOST_ACCURACY = 0.2
-"""Accuracy, as a fraction of the range, beyond which a sensor measures nothing [-]."""
-
-MOST_NOISE_SHARE = 0.1
-"""Noise, as a share of the range, beyond which a sensor measures nothing [-]."""
-
-
 def own_sensors(changes: Mapping[str, Mapping[str, float]]) -> dict[str, Sensor]:
     """Every channel's sensor, [bar absolute, A or V]; ParameterError for one that cannot be.
 
@@ -242,11 +231,7 @@ def own_sensors(changes: Mapping[str, Mapping[str, float]]) -> dict[str, Sensor]
 def changed_fields(sensors: Mapping[str, Sensor]) -> dict[str, dict[str, float]]:
     """What `own_sensors` was given: the fields that differ from Tables 1 to 3, by channel."""
     changed = {
-        name: {
-            field: value
-            for field, value in asdict(sensor).items()
-            if value != asdict(SENSORS[name])[field]
-        }
+        name: {field: v for field, v in asdict(sensor).items() if v != getattr(SENSORS[name], field)}
         for name, sensor in sensors.items()
     }
     return {name: fields for name, fields in changed.items() if fields}
@@ -266,13 +251,13 @@ def _check(name: str, sensor: Sensor) -> None:
         raise ParameterError(
             f"{place}.low = {sensor.low:g} bar lies below vacuum: give absolute ranges, not gauge"
         )
-    if not 0 < sensor.accuracy <= MOST_ACCURACY:
+    if not 0 < sensor.accuracy <= 0.2:
         raise ParameterError(
-            f"{place}.accuracy = {sensor.accuracy:g} must lie in (0, {MOST_ACCURACY:g}]: give it as a "
-            "fraction of the range's end, 0.01 for 1 %"
+            f"{place}.accuracy = {sensor.accuracy:g} must lie in (0, 0.2]: give it as a fraction of the "
+            "range's end, 0.01 for 1 %"
         )
-    if not 0 < sensor.noise <= MOST_NOISE_SHARE * (sensor.high - sensor.low):
+    if not 0 < sensor.noise <= 0.1 * (sensor.high - sensor.low):
         raise ParameterError(
-            f"{place}.noise = {sensor.noise:g} {unit} must be positive and at most "
-            f"{MOST_NOISE_SHARE:g} of the range: give its standard deviation"
+            f"{place}.noise = {sensor.noise:g} {unit} must be positive and at most 0.1 of the range: "
+            "give its standard deviation"
         )

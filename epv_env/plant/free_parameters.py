@@ -2,15 +2,15 @@
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+
+import msgspec
 
 from epv_env.plant.effects.law import SYMBOLS
 from epv_env.plant.parameters import ParameterError, Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 
 
-@dataclass(frozen=True, kw_only=True)
-class Freedom:
+class Freedom(msgspec.Struct, frozen=True, kw_only=True, omit_defaults=True, forbid_unknown_fields=True):
     """How far a calibration may move one parameter."""
 
     bounds: tuple[float, float] | None = None
@@ -32,21 +32,14 @@ def check_free(free: Mapping[str, Freedom], parameters: Parameters) -> None:
     """
     if not free:
         raise ParameterError("free names no parameter: leave it out, or name what is to be calibrated")
+    rows = table().items()
+    movable = [s for s, row in rows if row.domain and row.group != "environment" and s not in SYMBOLS]
     for symbol, freedom in free.items():
-        row = table().get(symbol)
-        if row is None or symbol not in _movable():
-            raise ParameterError(
-                f"free.{symbol} cannot be calibrated: choose from {', '.join(_movable())}"
-            )
+        if symbol not in movable:
+            raise ParameterError(f"free.{symbol} cannot be calibrated: choose from {', '.join(movable)}")
         low, high = freedom.bounds or parameters.domain(symbol)
         _check_bounds(symbol, (low, high), parameters)
         _check_prior(symbol, freedom, (low, high))
-
-
-def _movable() -> list[str]:
-    """Symbols of the valve's parameters and of the sizes of effects."""
-    rows = table().items()
-    return [s for s, row in rows if row.domain and row.group != "environment" and s not in SYMBOLS]
 
 
 def _check_bounds(symbol: str, bounds: tuple[float, float], parameters: Parameters) -> None:

@@ -13,7 +13,6 @@ import numpy as np
 from epv_env.common.field_types import check_type
 from epv_env.common.units import BAR
 from epv_env.plant.effects import law
-from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 
 
@@ -44,12 +43,14 @@ class Parameter:
     meaning: str
     """What the parameter is, in a line."""
 
+    def __post_init__(self) -> None:
+        for name in ("domain", "possible"):
+            ends = getattr(self, name)
+            object.__setattr__(self, name, ends and tuple(ends))  # JSON has lists
+
 
 Domains = Mapping[str, tuple[float, float]]
 """Least and greatest value by symbol [SI]."""
-
-_RANGES = ("domain", "possible")
-"""Fields of a row that are ranges."""
 
 _REPORTS: Domains = MappingProxyType({})
 """Own domains of the report's valve: none, the table's hold."""
@@ -64,27 +65,19 @@ def _data() -> dict[str, Any]:
 @cache
 def table() -> Mapping[str, Parameter]:
     """Every parameter by its symbol: the report's in order, then sizes of effects and laws."""
-    rows = [
-        Parameter(**{**row, **{name: tuple(row[name]) if row[name] else None for name in _RANGES}})
-        for row in _data()["parameters"]
-    ]
+    rows = [Parameter(**row) for row in _data()["parameters"]]
+    sizes = [(f"effect {effect.name}", size) for effect in EFFECTS for size in effect.sizes]
+    sizes += [("law of an effect", size) for size in law.sizes(EFFECTS)]
     rows += [
-        _size_row(f"effect {effect.name}", size)
-        for effect in EFFECTS
-        for size in effect.sizes
+        Parameter(
+            symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain,
+            possible=size.domain, group="unmodelled", sensitive=False, source=source,
+            meaning=size.meaning,
+        )
+        for source, size in sizes
         if size.domain
-    ]
-    rows += [_size_row("law of an effect", size) for size in law.sizes(EFFECTS)]
+    ]  # fmt: skip
     return MappingProxyType({row.symbol: row for row in rows})
-
-
-def _size_row(source: str, size: Size) -> Parameter:
-    """The row of a number that sizes an effect or a law; 0, which is off, is its value."""
-    return Parameter(
-        symbol=size.symbol, unit=size.unit, value=0.0, domain=size.domain,
-        possible=size.domain, group="unmodelled", sensitive=False, source=source,
-        meaning=size.meaning,
-    )  # fmt: skip
 
 
 def sensitive_symbols() -> tuple[str, ...]:
@@ -97,20 +90,20 @@ def confidence_intervals() -> dict[str, tuple[float, float]]:
     return {symbol: (low, high) for symbol, (low, high) in _data()["confidence95"]["intervals"].items()}
 
 
-def checked_value(symbol: str, value: Any, own: Domains = _REPORTS) -> float:
+def checked_value(symbol: str, value: Any, domains: Domains = _REPORTS) -> float:
     """The value as a float, if `symbol` exists and its domain holds it; else ParameterError.
 
-    own: domains of the plant that replace the table's [SI].
+    domains: those of the plant that replace the table's [SI].
     """
     row = _row(symbol)
     if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
         raise ParameterError(f"parameter {symbol} is {value!r}: give one number [{row.unit}]")
-    low, high = own.get(symbol, row.domain or (row.value, row.value))
+    low, high = domains.get(symbol, row.domain or (row.value, row.value))
     if not low <= value <= high:
-        source = "the plant's own" if symbol in own else row.source
+        source = "the plant's own" if symbol in domains else row.source
         raise ParameterError(
             f"parameter {symbol} = {value:g} {row.unit} is outside its domain "
-            f"[{low:g}, {high:g}] ({source}): {_remedy(row, symbol in own)}"
+            f"[{low:g}, {high:g}] ({source}): {_remedy(row, symbol in domains)}"
         )
     return float(value)
 
@@ -147,15 +140,11 @@ def checked_domain(symbol: str, ends: tuple[float, float]) -> tuple[float, float
     return float(low), float(high)
 
 
-SMALLEST_PRESSURE = 16.0
-"""Least magnitude of a pressure that somebody writes down [Pa], other than 0. The sensors' range is 16
-bar, so a smaller number is one in bar."""
-
-
-def written_value(symbol: str, value: Any, own: Domains = _REPORTS) -> float:
+def written_value(symbol: str, value: Any, domains: Domains = _REPORTS) -> float:
     """`checked_value` of what a person wrote: a pressure in bar is refused too (ParameterError)."""
-    checked = checked_value(symbol, value, own)
-    if table()[symbol].unit == "Pa" and 0 < abs(checked) <= SMALLEST_PRESSURE:
+    checked = checked_value(symbol, value, domains)
+    # The sensors' range is 16 bar, so a smaller number is one in bar.
+    if table()[symbol].unit == "Pa" and 0 < abs(checked) <= 16.0:
         raise ParameterError(
             f"parameter {symbol} = {checked:g} is in Pa, and {checked:g} Pa is less than a sensor "
             f"resolves: write {checked * BAR:g} if you mean {checked:g} bar"
@@ -180,15 +169,15 @@ class Parameters(Mapping[str, float]):
         Raises:
             ParameterError: a symbol is missing, unknown, or has a value or domain that cannot be.
         """
-        for name, given in (("values", values), ("own_domains", own_domains)):
-            check_type(f"Parameters: {name}", given, Mapping, ParameterError)
+        check_type("Parameters: values", values, Mapping, ParameterError)
+        check_type("Parameters: own_domains", own_domains, Mapping, ParameterError)
         missing = [symbol for symbol in table() if symbol not in values]
         if missing:
             raise ParameterError(f"missing parameters: {', '.join(missing)}: give every symbol")
-        own = {symbol: checked_domain(symbol, ends) for symbol, ends in own_domains.items()}
-        checked = {symbol: checked_value(symbol, value, own) for symbol, value in values.items()}
+        domains = {symbol: checked_domain(symbol, ends) for symbol, ends in own_domains.items()}
+        checked = {symbol: checked_value(symbol, value, domains) for symbol, value in values.items()}
         self._values = {symbol: checked[symbol] for symbol in table()}
-        self._own_domains: Domains = own
+        self._own_domains: Domains = domains
 
     @classmethod
     def nominal(cls) -> "Parameters":
@@ -207,9 +196,8 @@ class Parameters(Mapping[str, float]):
 
     def replace(self, **changes: float) -> "Parameters":
         """A copy with some values changed. Raises ParameterError."""
-        own = self._own_domains
         return self.replace_unchecked(
-            {symbol: checked_value(symbol, value, own) for symbol, value in changes.items()}
+            {s: checked_value(s, value, self._own_domains) for s, value in changes.items()}
         )
 
     def replace_unchecked(self, changes: Mapping[str, float]) -> "Parameters":

@@ -76,14 +76,6 @@ class _JointFields(msgspec.Struct):
     chi_square: float
 
 
-class _FreeFields(msgspec.Struct, forbid_unknown_fields=True):
-    """A parameter of field `free`."""
-
-    bounds: tuple[float, float] | None = None
-    mean: float | None = None
-    sd: float | None = None
-
-
 class _RegionFields(msgspec.Struct):
     """Field `region`."""
 
@@ -113,7 +105,7 @@ class _PlantFile(_Values):
     domains: dict[str, tuple[float, float]] = {}
     voltage_V: float = VOLTAGE
     sensors: dict[str, dict[str, float]] = {}
-    free: dict[str, _FreeFields] | None = None
+    free: dict[str, Freedom] | None = None
     alternatives: list[_AlternativeFields] = []
     provenance: dict[str, Any] = {}
 
@@ -128,10 +120,9 @@ def load_plant(source: "Plant | str | PathLike[str] | None") -> Plant:
         return source
     if source is None:
         return Plant.calibrated()
-    given = "a Plant, the path of a plant.json, or None"
-    check_type("the plant", source, str | PathLike, PlantFileError, given)
-    path = Path(source)
-    return _plant(_content(path), f"plant file {path}")
+    expected = "a Plant, the path of a plant.json, or None"
+    check_type("the plant", source, str | PathLike, PlantFileError, expected)
+    return _plant(_content(Path(source)), f"plant file {Path(source)}")
 
 
 def _content(path: Path) -> _PlantFile:
@@ -142,11 +133,11 @@ def _content(path: Path) -> _PlantFile:
         content = decoded(path, remedy=remedy, what="plant file", allow_nan=True)
     except JSONFileError as error:
         raise PlantFileError(str(error)) from None
-    found = content.get("format") if isinstance(content, dict) else None
-    if found != FORMAT:
+    version_read = content.get("format") if isinstance(content, dict) else None
+    if version_read != FORMAT:
         raise PlantFileError(
-            f"plant file {path} has format {found!r}, this version reads {FORMAT!r}: write it anew "
-            "with this version's identification"
+            f"plant file {path} has format {version_read!r}, this version reads {FORMAT!r}: write it "
+            "anew with this version's identification"
         )
     try:
         return checked(content, _PlantFile, where=f"plant file {path}: content", remedy=REMEDY)
@@ -173,13 +164,13 @@ def _as_json(plant: Plant) -> dict[str, Any]:
         "domains": {symbol: list(ends) for symbol, ends in plant.parameters.own_domains.items()},
         "voltage_V": plant.voltage,
         "sensors": changed_fields(plant.sensors),
-        "free": {symbol: _given(freedom) for symbol, freedom in plant.free.items()},
+        "free": msgspec.json.decode(msgspec.json.encode(dict(plant.free))),
     }
     if plant.diagnosis is not None:
         content["alternatives"] = [
-            {"name": each.name, "probability": each.probability}
-            | _written(each.region.centre, each.region)
-            for each in plant.diagnosis.alternatives
+            {"name": alternative.name, "probability": alternative.probability}
+            | _written(alternative.region.centre, alternative.region)
+            for alternative in plant.diagnosis.alternatives
         ]
     return content
 
@@ -189,8 +180,7 @@ def _written(parameters: Parameters, region: Region) -> dict[str, Any]:
     effects = {
         name: {symbol: parameters[symbol] for symbol in symbols} for name, symbols in CATALOGUE.items()
     }
-    sizing = {symbol for symbols in CATALOGUE.values() for symbol in symbols}
-    sizing |= set(SYMBOLS)
+    sizing = {*SYMBOLS, *(symbol for symbols in CATALOGUE.values() for symbol in symbols)}
     uncertain: dict[str, Any] = {"boxes": {symbol: list(ends) for symbol, ends in region.boxes.items()}}
     if region.covariance is not None:
         uncertain["joint"] = {
@@ -213,15 +203,21 @@ def _plant(content: _PlantFile, place: str) -> Plant:
         sensors = own_sensors(content.sensors)
         if content.domains or content.sensors or content.voltage_V != VOLTAGE:
             check_valve(parameters, content.voltage_V, sensors)
+        if content.free is not None:
+            check_free(content.free, parameters)
         return Plant(
             parameters=parameters,
             region=_region(content.region, parameters),
-            diagnosis=_diagnosis(content),
+            diagnosis=Mixture(
+                alternatives=tuple(_alternative(each, content) for each in content.alternatives)
+            )
+            if content.alternatives
+            else None,
             name=content.name,
             provenance=content.provenance,
             voltage=content.voltage_V,
             sensors=sensors,
-            free=_free(content, parameters),
+            free=FREE_PARAMETERS if content.free is None else content.free,
         )
     except ParameterError as error:
         raise PlantFileError(f"{place}: {error}") from None
@@ -229,35 +225,13 @@ def _plant(content: _PlantFile, place: str) -> Plant:
         raise PlantFileError(f"{place}: {error}: {REMEDY}") from None
 
 
-def _free(content: _PlantFile, parameters: Parameters) -> Mapping[str, Freedom]:
-    """What a calibration may move. Raises ParameterError."""
-    if content.free is None:
-        return FREE_PARAMETERS
-    free = {symbol: Freedom(**msgspec.structs.asdict(given)) for symbol, given in content.free.items()}
-    check_free(free, parameters)
-    return free
-
-
-def _given(freedom: Freedom) -> dict[str, Any]:
-    """The fields of a Freedom that say anything, for JSON."""
-    given = {name: value for name, value in asdict(freedom).items() if value is not None}
-    return {name: list(value) if isinstance(value, tuple) else value for name, value in given.items()}
-
-
-def _diagnosis(content: _PlantFile) -> Mixture | None:
-    """The alternatives. Raises ParameterError and ValueError."""
-    if not content.alternatives:
-        return None
-    return Mixture(alternatives=tuple(_alternative(each, content) for each in content.alternatives))
-
-
-def _alternative(given: _AlternativeFields, content: _PlantFile) -> Alternative:
+def _alternative(entry: _AlternativeFields, content: _PlantFile) -> Alternative:
     """One of the alternatives. Raises ParameterError and ValueError."""
     try:
-        region = _region(given.region, _parameters(given, content.domains))
+        region = _region(entry.region, _parameters(entry, content.domains))
     except ValueError as error:
-        raise type(error)(f"alternative {given.name!r}: {error}") from None
-    return Alternative(name=given.name, probability=given.probability, region=region)
+        raise type(error)(f"alternative {entry.name!r}: {error}") from None
+    return Alternative(name=entry.name, probability=entry.probability, region=region)
 
 
 def _parameters(content: _Values, domains: Mapping[str, tuple[float, float]]) -> Parameters:
@@ -286,12 +260,7 @@ def _parameters(content: _Values, domains: Mapping[str, tuple[float, float]]) ->
 
 def _region(region: _RegionFields, centre: Parameters) -> Region:
     """The confidence region around the plant's parameters. Raises ParameterError and ValueError."""
-    if region.joint is None:
-        return Region(centre=centre, boxes=region.boxes)
-    return Region(
-        centre=centre,
-        boxes=region.boxes,
-        symbols=region.joint.symbols,
-        covariance=np.array(region.joint.covariance, dtype=float),
-        chi_square=region.joint.chi_square,
-    )
+    joint: dict[str, Any] = msgspec.structs.asdict(region.joint) if region.joint else {}
+    if joint:
+        joint["covariance"] = np.array(joint["covariance"], dtype=float)
+    return Region(centre=centre, boxes=region.boxes, **joint)

@@ -25,12 +25,6 @@ REGIONS = ("exact", "confidence", "ten_percent", "sensitive_ten_percent", "domai
 DIAGNOSIS = "diagnosis"
 """Name of the mixture that a plant file may hold beside its region."""
 
-PROBABILITY_SLACK = 1e-6
-"""How far the sum of a mixture's probabilities may lie from 1: they were written in decimals."""
-
-TOWARDS_ENDS = 0.4
-"""Both parameters of the beta distribution of `Region.towards_ends` [1]."""
-
 
 @dataclass(frozen=True, kw_only=True)
 class Region:
@@ -107,34 +101,27 @@ class Region:
             )
         return cls(centre=centre, boxes=boxes)
 
-    @classmethod
-    def from_choices(cls, choices: Mapping[str, Any], centre: Parameters) -> "Region":
-        """Exact values and (low, high) ranges by symbol; what is not named stays at the centre."""
-        return cls(centre=centre).changed(choices)
-
     def changed(self, choices: Mapping[str, Any]) -> "Region":
         """The region with exact values and (low, high) ranges by symbol instead of its own."""
-        own = self.centre.own_domains
+        domains = self.centre.own_domains
         exact: dict[str, float] = {}
         boxes: dict[str, tuple[float, float]] = {}
         for symbol, choice in choices.items():
             if isinstance(choice, (tuple, list, np.ndarray)):
                 if len(choice) != 2:
                     raise ParameterError(f"range of {symbol} is {choice!r}: give (low, high)")
-                low, high = (written_value(symbol, end, own) for end in choice)
+                low, high = (written_value(symbol, end, domains) for end in choice)
                 boxes[symbol] = (low, high)
             else:
-                exact[symbol] = written_value(symbol, choice, own)
+                exact[symbol] = written_value(symbol, choice, domains)
         left = {symbol: ends for symbol, ends in self.boxes.items() if symbol not in choices}
         joint = [i for i, symbol in enumerate(self.symbols) if symbol not in choices]
-        covariance = (
-            self.covariance[np.ix_(joint, joint)] if self.covariance is not None and joint else None
-        )
+        block = np.ix_(joint, joint)
         return Region(
             centre=self.centre.replace(**exact),
             boxes={**left, **boxes},
             symbols=tuple(self.symbols[i] for i in joint),
-            covariance=covariance,
+            covariance=self.covariance[block] if self.covariance is not None and joint else None,
             chi_square=self.chi_square,
         )
 
@@ -165,7 +152,7 @@ class Region:
             return plant
         low, high = np.transpose([self.boxes[symbol] for symbol in symbols])
         share = (np.array([plant[symbol] for symbol in symbols]) - low) / (high - low)
-        moved = low + (high - low) * betaincinv(TOWARDS_ENDS, TOWARDS_ENDS, np.clip(share, 0.0, 1.0))
+        moved = low + (high - low) * betaincinv(0.4, 0.4, np.clip(share, 0.0, 1.0))
         return plant.replace_unchecked(dict(zip(symbols, moved.tolist(), strict=True)))
 
     @cached_property
@@ -206,20 +193,20 @@ class Mixture:
     alternatives: tuple[Alternative, ...]
 
     def __post_init__(self) -> None:
-        for each in self.alternatives:
-            if not 0 < each.probability <= 1:
+        for a in self.alternatives:
+            if not 0 < a.probability <= 1:
                 raise ParameterError(
-                    f"alternative {each.name!r} has probability {each.probability:g}: give one above 0 "
+                    f"alternative {a.name!r} has probability {a.probability:g}: give one above 0 "
                     "and at most 1"
                 )
-        whole = sum(each.probability for each in self.alternatives)
-        if abs(whole - 1) > PROBABILITY_SLACK:
+        whole = sum(a.probability for a in self.alternatives)
+        if abs(whole - 1) > 1e-6:  # they were written in decimals
             raise ParameterError(f"the alternatives' probabilities have the sum {whole:g}: make it 1")
 
     @cached_property
     def _ends(self) -> NDArray:
         """Probability of each alternative and those before it (alternatives,) [1]."""
-        return np.cumsum([each.probability for each in self.alternatives])
+        return np.cumsum([a.probability for a in self.alternatives])
 
     @property
     def centre(self) -> Parameters:
@@ -229,9 +216,7 @@ class Mixture:
     def changed(self, choices: Mapping[str, Any]) -> "Mixture":
         """`Region.changed` in every alternative."""
         return Mixture(
-            alternatives=tuple(
-                replace(each, region=each.region.changed(choices)) for each in self.alternatives
-            )
+            alternatives=tuple(replace(a, region=a.region.changed(choices)) for a in self.alternatives)
         )
 
     def chosen(self, rng: np.random.Generator) -> Region:

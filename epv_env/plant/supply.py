@@ -18,10 +18,6 @@ def two_point(p1, ran, cut_in, cut_out):
     return (p1 < cut_in) | (ran & (p1 < cut_out))
 
 
-REFILL_DELIVERY = 0.8
-"""Air that a full line passes into the reservoirs: from 5 to 12.5 bar within a second [kg/s]."""
-
-
 @dataclass(frozen=True, kw_only=True)
 class Supply:
     """The supply of the input chamber, the same rule for every valve of a batch.
@@ -90,10 +86,12 @@ class Supply:
     def starved(cls, pressure_bar: float, *, refill_s: float) -> "Supply":
         """Reservoirs at a low pressure [bar absolute], cut off until a full line refills them.
 
-        The refill begins at refill_s [s] and lasts less than a second.
+        The refill begins at refill_s [s] and lasts less than a second, from 5 to 12.5 bar.
         """
         reservoirs = cls.reservoirs((pressure_bar, pressure_bar))
-        return replace(reservoirs, delivery=REFILL_DELIVERY, idle_until=refill_s)
+        return replace(
+            reservoirs, delivery=0.8, idle_until=refill_s
+        )  # from 5 to 12.5 bar within a second
 
     @classmethod
     def recorded(cls, time_s: NDArray, pressure_bar: NDArray) -> "Supply":
@@ -125,11 +123,3 @@ class Supply:
     def lasting(self) -> float:
         """Pressure that the supply has in the long run, at least [Pa absolute]."""
         return max(self.pressure[0], self.cut_in)
-
-    def compressor_runs(self, p1: NDArray, ran: NDArray, time: float) -> NDArray:
-        """Whether the compressor runs now, boolean (n,), by two-point control with memory.
-
-        p1: supply pressure (n,) [Pa absolute]. ran: whether it ran before, boolean (n,). time: since
-        the episode's start [s].
-        """
-        return two_point(p1, ran, self.cut_in, self.cut_out) & (time >= self.idle_until)

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from epv_env.common.units import BAR
 from epv_env.plant import integrate
-from epv_env.plant.channels import SENSOR_SYMBOLS, readings
+from epv_env.plant.channels import SENSOR_SYMBOLS
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
@@ -22,9 +22,6 @@ from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.primitives import exact
 from epv_env.plant.runge_kutta import DEFAULT_STEP
-
-LANES_PER_TASK = 4 * LANES
-"""Fewest lanes, times periods, worth a thread of their own."""
 
 
 @cache
@@ -47,7 +44,8 @@ def share(work: Callable[[int, int], None], lanes: int, *, threads: int, periods
         threads: greatest number of parts.
         periods: that the work goes through; short work is not shared.
     """
-    tasks = min(threads, lanes // LANES, lanes * periods // LANES_PER_TASK)
+    worth = lanes * periods // (4 * LANES)  # fewer lanes, times periods, cost less than a thread
+    tasks = min(threads, lanes // LANES, worth)
     if tasks <= 1:
         work(0, lanes)
         return
@@ -131,9 +129,9 @@ class Tables(NamedTuple):
     effects: NDArray
     """(N_EFFECT, lanes) [SI]."""
     lowest: NDArray
-    """Least p2 since `Valves.forget_extremes`, (lanes,) [Pa]."""
+    """Least p2 so far, (lanes,) [Pa]."""
     highest: NDArray
-    """Greatest p2 since then, (lanes,) [Pa]."""
+    """Greatest p2 so far, (lanes,) [Pa]."""
     sensors: NDArray
     """A record with SENSOR_SYMBOLS for each valve, (lanes,) [SI]."""
 
@@ -151,27 +149,25 @@ class Valves:
         self.threads = available_cores() if threads is None else threads
         lanes = -(-n // LANES) * LANES
         calibrated = Parameters.calibrated()
-        self._coefficients = np.repeat(coefficients(calibrated), lanes, axis=1)
-        self._effects = np.repeat(effect_constants(calibrated), lanes, axis=1)
-        self._state = np.zeros((N_STATE, lanes))
-        State(*self._state).p1[:] = State(*self._state).p2[:] = State(*self._state).p3[:] = BAR
+        self.tables = Tables(
+            state=np.zeros((N_STATE, lanes)),
+            coefficients=np.repeat(coefficients(calibrated), lanes, axis=1),
+            effects=np.repeat(effect_constants(calibrated), lanes, axis=1),
+            lowest=np.full(lanes, np.inf),
+            highest=np.full(lanes, -np.inf),
+            sensors=np.zeros(lanes, dtype=SENSOR_RECORD),
+        )
+        """The arrays themselves, for compiled code that calls a kernel between work of its own."""
+        self.tables.state[[State._fields.index(name) for name in ("p1", "p2", "p3")]] = BAR
         self._inputs = np.zeros((N_INPUT, lanes))
         self._duration = np.zeros(lanes)
-        self._lowest = np.full(lanes, np.inf)
-        self._highest = np.full(lanes, -np.inf)
+        self._no_record = np.empty((0, N_STATE, lanes))
         self._with_effects = np.zeros(lanes, dtype=bool)
         self._delay = np.zeros(lanes)
         self._acting_U = np.full(lanes, np.nan)
         self._delay_left = np.zeros(lanes)
-        self._sensors = np.zeros(lanes, dtype=SENSOR_RECORD)
         self.nominal = True
         """Whether no valve has an effect or a delay: `integrate.run_nominal` is then all it takes."""
-
-    @property
-    def tables(self) -> Tables:
-        """The arrays themselves, for compiled code that calls a kernel between work of its own."""
-        return Tables(self._state, self._coefficients, self._effects, self._lowest, self._highest,
-                      self._sensors)  # fmt: skip
 
     @property
     def memory(self) -> dict[str, NDArray]:
@@ -189,27 +185,12 @@ class Valves:
     @property
     def state(self) -> State:
         """Views of the state, one array of shape (n,) per field; writing to them sets the state."""
-        return State(*self._state[:, : self.n])
+        return State(*self.tables.state[:, : self.n])
 
     @property
     def inputs(self) -> Inputs:
         """Views of the inputs that the next `advance` applies, shape (n,)."""
         return Inputs(*self._inputs[:, : self.n])
-
-    @property
-    def lowest_p2(self) -> NDArray:
-        """Least p2 since `forget_extremes` [Pa], shape (n,)."""
-        return self._lowest[: self.n]
-
-    @property
-    def highest_p2(self) -> NDArray:
-        """Greatest p2 since `forget_extremes` [Pa], shape (n,)."""
-        return self._highest[: self.n]
-
-    def forget_extremes(self) -> None:
-        """Start the running extremes of p2 anew."""
-        self._lowest[:] = np.inf
-        self._highest[:] = -np.inf
 
     def set_parameters(
         self, where: NDArray, p: Mapping[str, ArrayLike], reservoir_volume: ArrayLike = np.inf
@@ -219,21 +200,15 @@ class Valves:
         p: values by symbol, scalars or arrays (m,) [SI]. reservoir_volume: V1, scalar or (m,) [m^3];
         infinite for a supply that does not sag.
         """
-        self._coefficients[:, where] = coefficients(p, reservoir_volume)
+        self.tables.coefficients[:, where] = coefficients(p, reservoir_volume)
         constants = effect_constants(p)
-        self._effects[:, where] = constants
+        self.tables.effects[:, where] = constants
         self._with_effects[where] = has_effects(constants)
         self._delay[where] = p["t_delay"]
         self._acting_U[where] = np.nan
         for symbol in SENSOR_SYMBOLS:
-            self._sensors[symbol][where] = p[symbol]
+            self.tables.sensors[symbol][where] = p[symbol]
         self.settle()
-
-    def readings(self) -> dict[str, NDArray]:
-        """What the sensors of p1, p2, p3 and I have before them [Pa, A], shape (n,)."""
-        return readings(
-            self.state, {symbol: self._sensors[symbol][: self.n] for symbol in SENSOR_SYMBOLS}
-        )
 
     def advance(self, duration: ArrayLike) -> None:
         """Apply `inputs` for `duration` [s], one for all or one per valve (n,).
@@ -242,23 +217,16 @@ class Valves:
         the delay starts it anew.
         """
         self._duration[: self.n] = duration
-        if np.any(self._delay):
-            self._advance_delayed()
-        else:
-            self._advance_all()
-
-    def _advance_all(self) -> None:
-        self._run(self._inputs[None], self._duration[None], np.empty((0, *self._state.shape)))
-
-    def _advance_delayed(self) -> None:
-        """Advance under the former voltage as long as it still acts, then under the new one."""
+        if not np.any(self._delay):
+            self._run(self._inputs[None], self._duration[None], self._no_record)
+            return
+        # First under the former voltage as long as it still acts, then under the new one.
         commanded, total = Inputs(*self._inputs).U.copy(), self._duration.copy()
         former, before = self._acting_U.copy(), np.empty_like(total)
         _act(commanded, total, self._delay, self._acting_U, self._delay_left, before)
         for U, lasts in ((np.where(before > 0, former, commanded), before), (commanded, total - before)):
             Inputs(*self._inputs).U[:] = U
-            self._duration[:] = lasts
-            self._advance_all()
+            self._run(self._inputs[None], lasts[None], self._no_record)
 
     def record(self, inputs: Inputs, period: ArrayLike) -> State:
         """Apply a series of inputs, each for `period` [s], and keep every state.
@@ -268,7 +236,7 @@ class Valves:
         after each period. A valve that cannot be integrated becomes NaN.
         """
         samples = np.broadcast_shapes(*map(np.shape, inputs), (1, self.n))[0]
-        table = np.zeros((samples, N_INPUT, self._state.shape[1]))
+        table = np.zeros((samples, *self._inputs.shape))
         for row, field in enumerate(inputs):
             table[:, row, : self.n] = field
         duration = np.zeros((table.shape[0], table.shape[2]))
@@ -276,7 +244,7 @@ class Valves:
         delayed = bool(np.any(self._delay))
         if delayed:
             table, duration = delayed_inputs(table, duration, self._delay)
-        out = np.empty((table.shape[0], *self._state.shape))
+        out = np.empty((len(table), *self.tables.state.shape))
         self._run(table, duration, out)
         return State(*out[delayed :: 1 + delayed, :, : self.n].transpose(1, 0, 2))
 
@@ -304,9 +272,10 @@ class Valves:
         self, run: Callable[..., None], inputs: NDArray, duration: NDArray, out: NDArray
     ) -> None:
         """Run one kernel on all lanes, shared among threads."""
+        t = self.tables
 
         def work(first: int, last: int) -> None:
-            run(self._state, self._coefficients, self._effects, inputs, duration, self._lowest,
-                self._highest, out, self.step, first, last)  # fmt: skip
+            run(t.state, t.coefficients, t.effects, inputs, duration, t.lowest, t.highest, out,
+                self.step, first, last)  # fmt: skip
 
-        share(work, self._state.shape[1], threads=self.threads, periods=len(duration))
+        share(work, t.state.shape[1], threads=self.threads, periods=len(duration))

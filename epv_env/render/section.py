@@ -10,8 +10,6 @@ from epv_env.render.canvas import Box, Canvas, Colour, Point
 from epv_env.render.geometry import Snapshot
 
 AMBIENT_BAR = 1.0  # ambient pressure [bar absolute]
-CHOKED = 0.47  # pressure drop over upstream pressure from which the flow no longer grows [-]
-WIDEST_G_PER_S = 5.0  # consumption from which its arrow no longer grows [g/s]
 LEAST = 0.04  # strength of flow below which no arrow is drawn [-]
 
 
@@ -19,7 +17,8 @@ def strength(opening: float, upstream_bar: float, downstream_bar: float) -> floa
     """Flow through a passage as a share of the most it can pass; negative when reversed."""
     drop = upstream_bar - downstream_bar
     high = max(upstream_bar, downstream_bar, 1e-9)
-    size = min(max(opening, 0.0), 1.0) * min(1.0, abs(drop) / (CHOKED * high)) ** 0.5
+    # From this drop over the upstream pressure the flow no longer grows.
+    size = min(max(opening, 0.0), 1.0) * min(1.0, abs(drop) / (0.47 * high)) ** 0.5
     return size if drop >= 0.0 else -size
 
 
@@ -80,7 +79,7 @@ def draw_flows(canvas: Canvas, s: Snapshot, m: g.Movers) -> None:
     entering = to_output + 0.15 * to_control
     _arrow(canvas, [(32, 512), (90, 512)], entering, 9.0, c.pressure_colour(s.p1_bar))
     if s.sigma_S_g_per_s > 0.0:
-        width = 5.0 + 5.0 * min(1.0, s.sigma_S_g_per_s / WIDEST_G_PER_S)
+        width = 5.0 + 5.0 * min(1.0, s.sigma_S_g_per_s / 5.0)
         _arrow(canvas, [(597, 556), (652, 556)], 1.0, width, c.pressure_colour(s.p2_bar))
 
 
@@ -106,15 +105,13 @@ def _arrow(
         canvas.arrow(points if signed > 0 else points[::-1], colour, width, c.INK)
 
 
-FULL_GLOW_A = 0.45  # coil current at which the coil is drawn brightest [A]
-
 Profile = Sequence[tuple[float, float]]
 """Half widths and heights along the outline of a part that turns around an axis [px]."""
 
 
 def draw_coil(canvas: Canvas, s: Snapshot) -> None:
     """The windings glow with the current; a bright rim says that the coil is commanded on."""
-    glow = abs(s.I_A) / FULL_GLOW_A
+    glow = abs(s.I_A) / 0.45  # it is brightest at 0.45 A
     copper, wire = c.mix(c.COIL_COLD, c.COIL_HOT, glow), c.mix(c.WIRE_COLD, c.WIRE_HOT, glow)
     for side in (-1, 1):
         left, right = sorted((g.MV + side * (g.TUBE + 8), g.MV + side * (g.TUBE + 52)))

@@ -130,7 +130,9 @@ class Strip:
     def draw(self, canvas: Canvas) -> None:
         """Draw the history."""
         s = {
-            entry.name: np.array([getattr(each, entry.name) for each in self._history], dtype=float)
+            entry.name: np.array(
+                [getattr(snapshot, entry.name) for snapshot in self._history], dtype=float
+            )
             for entry in fields(Snapshot)
         }
         begin = max(0.0, float(s["time_s"][-1]) - WINDOW_S)

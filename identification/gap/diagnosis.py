@@ -1,6 +1,7 @@
 """The whole diagnosis of a grey-box plant: which cause, where, and how far the gap is reduced."""
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field
 
 from identification.block_bootstrap import Interval
 from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, evaluate_linearised
@@ -38,6 +39,7 @@ from identification.gap.plant_checks import check, check_description
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
 from identification.gap.search.cause_search import HypothesisPool, is_small, search_causes
+from identification.gap.search.onset import Onset
 from identification.gap.search.screening import assess_separability, simulate_signatures
 
 NOTICED_WORSENING = 0.05
@@ -64,12 +66,24 @@ class Diagnosis:
     """Causes whose discrepancy reduction was measured, the most probable first."""
     screened: tuple[Finding, ...]
     """Faulty readings that no fit uses."""
-    onset: tuple[str, float] | None = None
-    """Drive of an operation log from which the causes act, and the probability that they begin there;
-    None where they act from the first one."""
+    onsets: Mapping[str, Onset] = field(default_factory=dict)
+    """Of an operation log: where causes begin and end, by their labels; without those that act in all
+    drives."""
+    as_consumption: tuple[str, ...] = ()
+    """Of an operation log: absorbed causes that would show if consumption were known."""
     warnings: list[str]
     """Faulty readings, doubts about the plant's description, and fits that did not converge, in
     sentences."""
+
+    def onsets_of(self, cause: RankedCause) -> dict[str, Onset]:
+        """Where those of its effects begin and end that do not act in all drives, by label."""
+        labels = cause.hypothesis.labels
+        return {label: self.onsets[label] for label in labels if label in self.onsets}
+
+    @property
+    def onset(self) -> Onset | None:
+        """That of the best cause's first effect with one; None where all act in all drives."""
+        return next(iter(self.onsets_of(self.best).values()), None) if self.best else None
 
     @property
     def best(self) -> RankedCause | None:

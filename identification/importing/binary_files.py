@@ -9,15 +9,13 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
+from identification.importing import times
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import (
-    STAMP,
     SourceChannel,
     check_number,
     limited,
     needed_package,
-    points_in_time,
-    seconds,
     unread,
 )
 from identification.importing.units import parsed_unit
@@ -38,30 +36,26 @@ MDF_SIGNATURES = (b"MDF", b"UnF")
 """First bytes of MDF, and of MDF that its writer did not finish."""
 
 
-def _mdf_channel(mdf: Any, signal: Any) -> SourceChannel:
-    """A channel with its own times."""
-    table = f"group {signal.group_index}"
-    if np.ndim(signal.samples) != 1 or np.asarray(signal.samples).dtype.kind not in "iufb":
-        return unread(signal.name, table)
-    return SourceChannel(
-        name=signal.name,
-        unit=signal.unit or "",
-        values=_valid(mdf, signal),
-        time=np.asarray(signal.timestamps, dtype=float),
-        table=table,
-    )
-
-
 ALL_INVALID = 1
 """Flag of an MDF 4 channel of which no reading counts; asammdf leaves it to its callers."""
 
 
-def _valid(mdf: Any, signal: Any) -> NDArray:
-    """The samples of an MDF channel, (samples,), NaN where they are marked invalid."""
+def _mdf_channel(mdf: Any, signal: Any) -> SourceChannel:
+    """A channel with its own times, NaN where a reading is marked invalid."""
+    table = f"group {signal.group_index}"
+    samples = np.asarray(signal.samples)
+    if samples.ndim != 1 or samples.dtype.kind not in "iufb":
+        return unread(signal.name, table)
     channel = mdf.groups[signal.group_index].channels[signal.channel_index]
     bits = False if signal.invalidation_bits is None else np.asarray(signal.invalidation_bits)
     invalid = bits | bool(getattr(channel, "flags", 0) & ALL_INVALID)
-    return np.where(invalid, np.nan, np.asarray(signal.samples, dtype=float))
+    return SourceChannel(
+        name=signal.name,
+        unit=signal.unit or "",
+        values=np.where(invalid, np.nan, samples.astype(float)),
+        time=np.asarray(signal.timestamps, dtype=float),
+        table=table,
+    )
 
 
 UNIT_PROPERTIES = ("unit_string", "NI_UnitDescription", "unit", "Unit")
@@ -85,16 +79,16 @@ def _tdms_channel(group: str, channel: Any) -> SourceChannel:
     """A waveform with its times and their begin, or a channel whose times are another channel."""
     if channel.dtype.kind not in "iufM":
         return unread(channel.name, group)
-    values, begin = seconds(np.asarray(channel[:]))
-    time = _waveform_times(channel.properties, len(values))
-    given = channel.properties
-    unit = next((str(given[name]) for name in UNIT_PROPERTIES if name in given), "")
+    values, begin = times.seconds(np.asarray(channel[:]))
+    properties = channel.properties
+    time = _waveform_times(properties, len(values))
+    unit = next((str(properties[name]) for name in UNIT_PROPERTIES if name in properties), "")
     return SourceChannel(
         name=channel.name,
         unit=unit or ("s" if begin is not None else ""),
         values=values,
         time=time,
-        begin=begin if time is None else channel.properties.get("wf_start_time"),
+        begin=begin if time is None else properties.get("wf_start_time"),
         table=group,
     )
 
@@ -112,31 +106,24 @@ def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric column, NaN where it is null; its unit is the field's metadata `unit`, if any."""
     parquet = needed_package("pyarrow.parquet", "Parquet files")
     check_number(path, parquet.read_metadata(path).num_columns)
-    table = parquet.read_table(path)
-    return "Parquet", limited(path, _parquet_channels(path, table))
+    return "Parquet", limited(path, _parquet_channels(path, parquet.read_table(path)))
 
 
 def _parquet_channels(path: Path, table: Any) -> Iterator[SourceChannel]:
     for field in table.schema:
-        values = _numbers_or_times(f"{path}, {field.name}", table.column(field.name))
+        values = table.column(field.name).to_numpy()
+        first = next((value for value in values if value is not None), None)
+        if isinstance(first, Decimal):
+            values = values.astype(float)
+        elif isinstance(first, str) and times.is_point(first):
+            values = times.points_in_time(f"{path}, {field.name}", values)
         if values.dtype.kind not in "iufMm":
             yield unread(field.name)
         else:
             unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-            timed = values.dtype.kind in "Mm"
-            numbers, begin = seconds(values)
-            yield SourceChannel(
-                name=field.name, unit="s" if timed else unit, values=numbers, begin=begin
-            )
-
-
-def _numbers_or_times(place: str, column: Any) -> NDArray:
-    """A column's numbers, or its points in time where its texts are some."""
-    values = column.to_numpy()
-    first = next((value for value in values if value is not None), None)
-    if isinstance(first, Decimal):
-        return values.astype(float)
-    return points_in_time(place, values) if isinstance(first, str) and STAMP.match(first) else values
+            unit = "s" if values.dtype.kind in "Mm" else unit
+            numbers, begin = times.seconds(values)
+            yield SourceChannel(name=field.name, unit=unit, values=numbers, begin=begin)
 
 
 HDF5_SIGNATURE = b"\x89HDF"
@@ -173,16 +160,18 @@ def _matlab_channels(path: str, content: Mapping[str, Any]) -> Iterator[SourceCh
     """The channels of a struct, and of the structs in it."""
     units = _first(content, UNIT_FIELDS)
     units = units if isinstance(units, Mapping) else {}
-    found = [
+    channels = [
         channel
         for name, value in content.items()
-        if not name.startswith("__")
+        if not name.startswith(("__", "#"))  # HDF5 keeps MATLAB's objects behind a #
         for channel in _matlab_field(path, f"{path}.{name}" if path else name, value, units.get(name))
     ]
-    yield from found
-    times = _times_of_interval(content)
-    if times is not None and not any(meaning(channel) == "time" for channel in found):
-        yield from _matlab_columns(f"{path}.time" if path else "time", times, "s", path)
+    yield from channels
+    steady = _times_of_interval(content)
+    if steady is not None and not any(
+        meaning(channel.name, channel.unit) == "time" for channel in channels
+    ):
+        yield from _matlab_columns(f"{path}.time" if path else "time", steady, "s", path)
 
 
 def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[SourceChannel]:
@@ -193,17 +182,14 @@ def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[Sourc
         yield from _single(path, full, value)
     elif isinstance(value, Mapping):
         yield from _matlab_channels(full, value)
-    elif isinstance(value, list) or _is_cell(value):
+    elif isinstance(value, list) or (
+        type(value) is np.ndarray and value.dtype == object and value.ndim == 1  # a cell array
+    ):
         for number, one in enumerate(value, start=1):
             named = isinstance(one, Mapping) and _first(one, NAME_FIELDS)
             yield from _matlab_field(path, str(named or f"{full}({number})"), one, "")
     elif isinstance(value, np.ndarray):
         yield from _matlab_columns(full, value, unit, path)
-
-
-def _is_cell(value: Any) -> bool:
-    """Whether a value is a cell array, whose cells are read one by one."""
-    return type(value) is np.ndarray and value.dtype == object and value.ndim == 1
 
 
 def _struct_array(name: str, struct: Mapping[str, Any]) -> Any:

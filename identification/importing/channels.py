@@ -4,6 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
+import pandas as pd
 from numpy.typing import NDArray
 
 from identification.importing.mapping_file import (
@@ -16,9 +17,16 @@ from identification.importing.mapping_file import (
     proposed,
     split_name,
 )
-from identification.importing.source_file import ImportingError, SourceChannel, SourceFile, begin_offsets
+from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
+from identification.importing.times import begin_offsets, in_order
 from identification.importing.units import PhysicalUnit, needed_unit, parsed_unit
 from identification.recordings.recording import CHANNELS
+
+LONGEST_GAP = 5e-3
+"""Longest stretch of missing readings that is filled [s]: shorter than any move of valve or pressure."""
+
+COMMANDS = ("U", "sigma_S")
+"""Channels that may be logged on change only, and that hold their value where a reading is missing."""
 
 
 def clock_of(
@@ -32,11 +40,11 @@ def clock_of(
     if named is not None:
         return _read(source, mapping, named_channel(source, named))
     if channel.time is not None:
-        return channel.time, channel.begin
+        return in_order(channel.time), channel.begin
     named = mapping.channels.get("time", ChannelEntry()).source
     table: str | None = channel.table
     while table is not None:
-        found = [
+        clocks = [
             other
             for other in source.channels
             if other.table == table
@@ -44,8 +52,14 @@ def clock_of(
             and len(other.values) == len(channel.values)
             and (_is_called(other, named) if named else _holds_times(other))
         ]
-        if found:
-            return _read(source, mapping, _only(source, channel, found))
+        if len(clocks) > 1:
+            names = " or ".join(repr(source.label(clock)) for clock in clocks[:4])
+            raise ImportingError(
+                f"{source.path}: {names} may hold the times of {channel.name}: name one in a mapping "
+                'file, as "time" or in the field "time" of the channel'
+            )
+        if clocks:
+            return _read(source, mapping, clocks[0])
         table = table.rpartition(".")[0] if table else None
     raise ImportingError(
         f"{source.path}: no channel holds the times of {channel.name}: name one, with its unit, as "
@@ -60,33 +74,22 @@ def _is_called(channel: SourceChannel, name: str) -> bool:
 
 
 def _holds_times(channel: SourceChannel) -> bool:
-    """Whether a channel increases throughout and is called a time, or has a unit of time."""
+    """Whether a channel is called a time, or has a unit of time and increases throughout."""
+    if meaning(channel.name, channel.unit) == "time":
+        return bool(channel.known.size)
     unit = parsed_unit(channel.unit or split_name(channel.name)[1])
-    called = meaning(channel) == "time" or (unit is not None and unit.quantity == "time")
-    values = channel.known
-    increases = meaning(channel) == "time" or bool(np.all(np.diff(values) > 0))
-    return called and values.size > 0 and increases
-
-
-def _only(source: SourceFile, channel: SourceChannel, found: list[SourceChannel]) -> SourceChannel:
-    if len(found) > 1:
-        names = " or ".join(repr(source.label(each)) for each in found[:4])
-        raise ImportingError(
-            f"{source.path}: {names} may hold the times of {channel.name}: name one in a mapping file, "
-            'as "time" or in the field "time" of the channel'
-        )
-    return found[0]
+    timed = unit is not None and unit.quantity == "time" and channel.known.size
+    return bool(timed and np.all(np.diff(channel.known) > 0))
 
 
 def _read(
     source: SourceFile, mapping: MappingFile, times: SourceChannel
 ) -> tuple[NDArray, np.datetime64 | None]:
     """The mapping file's unit and factor come before the file's own."""
-    wanted = mapping.channels.get("time")
-    text = (wanted.unit if wanted else None) or times.unit or split_name(times.name)[1] or "s"
+    entry = mapping.channels.get("time", ChannelEntry())
+    text = entry.unit or times.unit or split_name(times.name)[1] or "s"
     unit = needed_unit(text, "time", f"{source.path}, {times.name}")
-    factor = wanted.factor if wanted else 1.0
-    return times.values * unit.size * factor, times.begin
+    return in_order(times.values) * unit.size * entry.factor, times.begin
 
 
 SUPPLY_PAIR = ("p1a", "p1b")
@@ -111,6 +114,10 @@ class MappedChannel:
     """The point in time at which its file's clock is 0; None: not told."""
     values: NDArray
     """(samples,) [SI; pressures absolute]."""
+    filled: int
+    """Missing readings that were filled from their neighbours."""
+    period: float | None = None
+    """Between samples [s], once they lie on a uniform grid; None: not known, or they jitter."""
 
     @property
     def conversion(self) -> str:
@@ -129,24 +136,29 @@ def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, Sourc
     }
     taken = {id(channel) for channel in chosen.values()}
     free = [channel for channel in source.channels if id(channel) not in taken]
-    found = {n: each for n, each in proposed(free).items() if n != "time" and n not in chosen}
-    several = {
-        name: [source.label(channel) for channel in candidates[:4]]
-        for name, candidates in found.items()
-        if len(candidates) > 1
-    }
+    candidates = {n: cs for n, cs in proposed(free).items() if n != "time" and n not in chosen}
+    several = {n: [source.label(c) for c in cs[:4]] for n, cs in candidates.items() if len(cs) > 1}
     if several:
-        listed = ", ".join(f"{n} may be {' or '.join(map(repr, each))}" for n, each in several.items())
+        listed = ", ".join(f"{n} may be {' or '.join(map(repr, names))}" for n, names in several.items())
         first = {name: labels[0] for name, labels in several.items()}
         raise ImportingError(
             f"{source.path}: {listed}: choose in a mapping file such as "
             f"{mapping_example(first, units=False)}"
         )
-    chosen |= {name: candidates[0] for name, candidates in found.items()}
+    chosen |= {name: channels[0] for name, channels in candidates.items()}
     if "p1" in chosen:
         chosen = {name: channel for name, channel in chosen.items() if name not in SUPPLY_PAIR}
     _check_complete(source, mapping, chosen)
-    _check_units(source, mapping, chosen)
+    silent = {
+        name: source.label(channel)
+        for name, channel in chosen.items()
+        if not _unit_text(mapping.channels.get(name, ChannelEntry()), channel)
+    }
+    if silent:
+        raise ImportingError(
+            f"{source.path}: there is no unit of {', '.join(silent)}: give the right ones in a mapping "
+            f"file such as {mapping_example(silent)}"
+        )
     return chosen
 
 
@@ -174,27 +186,15 @@ def _check_complete(
     supply = () if "p1" in chosen or all(name in chosen for name in SUPPLY_PAIR) else ("p1",)
     missing = [name for name in (*supply, *REQUIRED) if name not in chosen]
     if missing:
-        timed = any(c.time is not None or meaning(c) == "time" for c in source.channels)
-        missing = missing if timed or "time" in mapping.channels else ["time", *missing]
         used = {id(channel) for channel in chosen.values()}
-        free = [source.label(c) for c in source.channels if id(c) not in used and meaning(c) != "time"]
+        clocks = {id(c) for c in source.channels if meaning(c.name, c.unit) == "time"}
+        timed = clocks or any(channel.time is not None for channel in source.channels)
+        missing = missing if timed or "time" in mapping.channels else ["time", *missing]
+        free = [source.label(channel) for channel in source.channels if id(channel) not in used | clocks]
         raise ImportingError(
             f"{source.path}: no channel is known to be {', '.join(missing)}; not used are "
             f"{', '.join(free[:20]) or 'none'}: name it in a mapping file such as "
             f"{mapping_example(dict.fromkeys(missing, 'NAME'))}"
-        )
-
-
-def _check_units(source: SourceFile, mapping: MappingFile, chosen: Mapping[str, SourceChannel]) -> None:
-    silent = {
-        name: source.label(channel)
-        for name, channel in chosen.items()
-        if not _unit_text(mapping.channels.get(name, ChannelEntry()), channel)
-    }
-    if silent:
-        raise ImportingError(
-            f"{source.path}: there is no unit of {', '.join(silent)}: give the right ones in a mapping "
-            f"file such as {mapping_example(silent)}"
         )
 
 
@@ -219,16 +219,28 @@ def _mapped(
             )
         offset = ambient
     times, begin = clock_of(source, mapping, channel, entry.time)
-    time, values = _filled(place, times, channel.values)
+    if len(times) != len(channel.values):
+        raise ImportingError(
+            f"{place} has {len(channel.values)} samples and {len(times)} times: export it with one time "
+            "for each"
+        )
+    steps = np.diff(times[np.isfinite(times)])
+    longest = max(1, int(LONGEST_GAP / np.median(steps))) if np.any(steps > 0) else 0
+    times = _bridged(times, longest)
+    readings = _bridged(channel.values, longest, holds=name in COMMANDS)
+    good = np.isfinite(times) & np.isfinite(readings)
+    if np.count_nonzero(good) < 2:
+        raise ImportingError(f"{place} has fewer than two samples: leave the file out")
     return MappedChannel(
         name=name,
         source=channel,
         unit=unit,
         reference=reference,
         factor=entry.factor,
-        time=time,
+        time=times[good],
         begin=begin,
-        values=entry.factor * unit.size * values + offset,
+        values=entry.factor * unit.size * readings[good] + offset,
+        filled=int(np.count_nonzero(good & ~np.isfinite(channel.values))),
     )
 
 
@@ -251,16 +263,18 @@ def _unit_text(entry: ChannelEntry, channel: SourceChannel) -> str:
     return entry.unit or channel.unit or split_name(channel.name)[1]
 
 
-def _filled(place: str, time: NDArray, values: NDArray) -> tuple[NDArray, NDArray]:
-    """The rows that have both time and value: slow channels leave cells empty."""
-    if len(time) != len(values):
-        raise ImportingError(
-            f"{place} has {len(values)} samples and {len(time)} times: export it with one time for each"
-        )
-    good = np.isfinite(time) & np.isfinite(values)
-    if np.count_nonzero(good) < 2:
-        raise ImportingError(f"{place} has fewer than two samples: leave the file out")
-    return time[good], values[good]
+def _bridged(values: NDArray, longest: int, *, holds: bool = False) -> NDArray:
+    """Values (samples,) with missing ones between their neighbours, of at most so many in a row.
+
+    Slow channels leave many cells empty: nothing is missing there. holds: the last value stays instead.
+    """
+    series = pd.Series(np.where(np.isfinite(values), values, np.nan))
+    missing = series.isna()
+    if missing.mean() > 0.25:
+        return series.to_numpy()
+    run = missing.groupby((~missing).cumsum()).transform("sum")
+    filled = series.ffill() if holds else series.interpolate(limit_area="inside")
+    return filled.where(~missing | (run <= longest)).to_numpy()
 
 
 def supply_pair_mean(signals: Mapping[str, NDArray]) -> dict[str, NDArray]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, kaiserord, oaconvolve
 
-from identification.importing.channels import MappedChannel
+from identification.importing.channels import COMMANDS, MappedChannel
 from identification.importing.source_file import ImportingError
 from identification.recordings.columns import LEAST_RATE, last_digit, roundest
 
@@ -36,8 +36,6 @@ SAME_TIME = 1e-2
 which the steepest pressure changes by less than its noise."""
 LEAST_STEP = 0.1
 """Least change over the range of a channel that goes in steps; what is measured changes by less."""
-COMMANDS = ("U", "sigma_S")
-"""Channels that may be logged on change only."""
 GREATEST_RATE = 20_000.0
 """Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
 slower, and longer files only cost time."""
@@ -71,15 +69,18 @@ def on_common_grid(
     """
     for channel in channels:
         _check_times(f"{place}, {channel.source.name}", channel)
-    on_grids = [_on_its_grid(channel) for channel in channels]
-    channels = [channel for channel, _ in on_grids]
-    own = {channel.name: period for channel, period in on_grids}
+    channels = [_on_its_grid(channel) for channel in channels]
     sampled = [channel for channel in channels if not _is_logged_on_change(channel)]
-    period = _period(sampled, own, rate)
-    grid = _grid(place, channels, sampled, own, period)
+    periods = [
+        channel.period or 1.0 / max(round(usual_rate(channel.time)), LEAST_RATE)
+        for channel in sampled
+        if channel.name != "sigma_S"
+    ]
+    period = max(*periods, 1.0 / GREATEST_RATE) if rate is None else 1.0 / rate
+    grid = _grid(place, channels, sampled, period)
     signals, changed, held = {}, [], []
     for channel in channels:
-        first = _first_sample(channel, own[channel.name], grid, period)
+        first = _first_sample(channel, grid, period)
         if first is not None:
             signals[channel.name] = channel.values[first : first + len(grid)]
         elif channel.name == "U" or _goes_in_steps(channel.values):
@@ -92,13 +93,19 @@ def on_common_grid(
     return GriddedSignals(period=period, signals=signals, resampled=tuple(changed), held=tuple(held))
 
 
-def _on_its_grid(channel: MappedChannel) -> tuple[MappedChannel, float | None]:
-    """A channel with its times free of rounding and its period [s]; as it is and None if they jitter."""
-    found = uniform_grid(channel.time)
-    if found is None:
-        return channel, None
-    begin, period = found
-    return replace(channel, time=begin + period * np.arange(len(channel.time))), period
+def _on_its_grid(channel: MappedChannel) -> MappedChannel:
+    """A channel with the grid of which its times are rounded; as it is if they jitter."""
+    time = channel.time
+    count, since = np.arange(len(time)), time - time[0]
+    slope = float(np.polyfit(count, since, 1)[0])
+    rounding = 0.5 * last_digit(since) + SAME_TIME * slope
+    margin = 3.0 * rounding / len(time)  # errors of no more than the rounding turn the line by less
+    for period in (roundest(slope - margin, slope + margin), slope):
+        off = since - period * count
+        if np.ptp(off) <= 2.0 * rounding:
+            begin = float(time[0] + 0.5 * (np.min(off) + np.max(off)))
+            return replace(channel, time=begin + period * count, period=period)
+    return channel
 
 
 def _goes_in_steps(values: NDArray) -> bool:
@@ -120,8 +127,9 @@ def _check_times(place: str, channel: MappedChannel) -> None:
     steps = np.diff(channel.time)
     backward = np.flatnonzero(steps <= 0)
     if backward.size:
-        at, equal = channel.time[backward[0]], steps[backward[0]] == 0
-        remedy = "print it with more digits" if equal else "sort the samples"
+        at, falls = channel.time[backward[0]], steps[backward[0]] < 0
+        remedy = "cut the recording there, or sort its samples if they are out of order"
+        remedy = remedy if falls else "print it with more digits"
         raise ImportingError(f"{place}: time does not increase after {at:.6g} s: {remedy}")
     if _is_logged_on_change(channel):
         return
@@ -143,45 +151,14 @@ def _check_times(place: str, channel: MappedChannel) -> None:
         )
 
 
-def uniform_grid(time: NDArray) -> tuple[float, float] | None:
-    """Begin and period [s] of the grid of which times (samples,) [s] are rounded; None: they jitter."""
-    count, since = np.arange(len(time)), time - time[0]
-    slope = float(np.polyfit(count, since, 1)[0])
-    rounding = 0.5 * last_digit(since) + SAME_TIME * slope
-    margin = 3.0 * rounding / len(time)  # errors of no more than the rounding turn the line by less
-    for period in (roundest(slope - margin, slope + margin), slope):
-        off = since - period * count
-        if np.ptp(off) <= 2.0 * rounding:
-            return float(time[0] + 0.5 * (np.min(off) + np.max(off))), period
-    return None
-
-
-def _period(
-    sampled: Sequence[MappedChannel], own: Mapping[str, float | None], rate: float | None
-) -> float:
-    if rate is not None:
-        return 1.0 / rate
-    periods = [
-        own[channel.name] or 1.0 / max(round(usual_rate(channel.time)), LEAST_RATE)
-        for channel in sampled
-        if channel.name != "sigma_S"
-    ]
-    return max(max(periods), 1.0 / GREATEST_RATE)
-
-
 def _grid(
-    place: str,
-    channels: Sequence[MappedChannel],
-    sampled: Sequence[MappedChannel],
-    own: Mapping[str, float | None],
-    period: float,
+    place: str, channels: Sequence[MappedChannel], sampled: Sequence[MappedChannel], period: float
 ) -> NDArray:
     """Times within all channels, (samples,) [s], on the samples of a uniform channel if there is one."""
     start = max(float(channel.time[0]) for channel in channels)
     end = min(float(channel.time[-1]) for channel in sampled)
     for channel in sampled:
-        step = own[channel.name]
-        if step is not None and abs(step / period - 1.0) < 1e-6:
+        if channel.period is not None and abs(channel.period / period - 1.0) < 1e-6:
             later = channel.time[channel.time >= start - SAME_TIME * period]
             start = float(later[0]) if later.size else start
             break
@@ -191,12 +168,12 @@ def _grid(
     return start + period * np.arange(count)
 
 
-def _first_sample(channel: MappedChannel, own: float | None, grid: NDArray, period: float) -> int | None:
+def _first_sample(channel: MappedChannel, grid: NDArray, period: float) -> int | None:
     """The sample with which the grid begins, if the channel's samples are the grid's; else None."""
-    if own is None or abs(own - period) * len(grid) > SAME_TIME * period:
+    if channel.period is None or abs(channel.period - period) * len(grid) > SAME_TIME * period:
         return None
-    first = round((grid[0] - channel.time[0]) / own)
-    apart = channel.time[0] + first * own - grid[0]
+    first = round((grid[0] - channel.time[0]) / channel.period)
+    apart = channel.time[0] + first * channel.period - grid[0]
     fits = first >= 0 and first + len(grid) <= len(channel.time)
     return first if fits and abs(apart) <= SAME_TIME * period else None
 
@@ -216,25 +193,13 @@ def resampled(time: NDArray, values: NDArray, grid: NDArray) -> NDArray:
     """
     period = float(grid[-1] - grid[0]) / (len(grid) - 1)
     own = usual_rate(time)
-    dense = max(1, math.ceil(RESAMPLING_MARGIN * own * period))
-    taps = _low_pass(min(own, 1.0 / period), dense / period)
-    half = len(taps) // 2
-    fine = grid[0] + np.arange(-half, dense * (len(grid) - 1) + half + 1) * (period / dense)
-    filtered = oaconvolve(_mirrored_spline(time, values, fine), taps, mode="valid")
-    return np.asarray(filtered)[::dense]
-
-
-def _low_pass(rate: float, fine_rate: float) -> NDArray:
-    """Taps of a symmetric filter of unit gain, odd in number; rates [1/s]."""
-    width = (STOPBAND - PASSBAND) * rate
-    count, beta = kaiserord(STOP_ATTENUATION, width / (0.5 * fine_rate))
-    cut = 0.5 * (PASSBAND + STOPBAND) * rate
+    lower, dense = min(own, 1.0 / period), max(1, math.ceil(RESAMPLING_MARGIN * own * period))
+    step = period / dense
+    count, beta = kaiserord(STOP_ATTENUATION, 2.0 * (STOPBAND - PASSBAND) * lower * step)
     window: Any = ("kaiser", beta)
-    return np.asarray(firwin(count | 1, cut, window=window, fs=fine_rate))
-
-
-def _mirrored_spline(time: NDArray, values: NDArray, at: NDArray) -> NDArray:
-    """The spline through the samples; beyond the ends, where the filter looks, their mirror image."""
-    inside = time[0] + np.abs(at - time[0])
-    inside = time[-1] - np.abs(time[-1] - inside)
-    return CubicSpline(time, values)(np.clip(inside, time[0], time[-1]))
+    taps = firwin(count | 1, 0.5 * (PASSBAND + STOPBAND) * lower, window=window, fs=1.0 / step)
+    half = len(taps) // 2
+    fine = grid[0] + np.arange(-half, dense * (len(grid) - 1) + half + 1) * step
+    fine = time[0] + np.abs(fine - time[0])  # beyond the ends, where the filter looks: mirror images
+    fine = np.clip(time[-1] - np.abs(time[-1] - fine), time[0], time[-1])
+    return np.asarray(oaconvolve(CubicSpline(time, values)(fine), taps, mode="valid"))[::dense]

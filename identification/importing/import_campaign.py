@@ -11,7 +11,6 @@ from typing import Any
 import msgspec
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
 
 from epv_env.common.files import LARGEST_FILE
 from epv_env.common.units import BAR
@@ -62,11 +61,30 @@ class ImportedCampaign:
 
     def provenance(self) -> dict[str, Any]:
         """Where each recording comes from and what was done to it, for campaign.json."""
-        return {
-            "made_by": "python -m identification import",
-            "assumptions": list(self.assumptions),
-            "files": [_file_provenance(file) for file in self.files],
-        }
+        files = [
+            {
+                "recording": file.recording.name,
+                "source": file.source.path.name,
+                "sha256": file.source.sha256,
+                "format": file.source.format,
+                "rate_Hz": 1.0 / file.gridded.period,
+                "channels": {
+                    channel.name: {
+                        "source": channel.source.name,
+                        "unit": channel.unit.text,
+                        **({"reference": channel.reference} if channel.reference else {}),
+                        "to_SI": channel.conversion,
+                        "resampled": channel.name in file.gridded.resampled,
+                        "held": channel.name in file.gridded.held,
+                        "filled": channel.filled,
+                    }
+                    for channel in file.channels
+                },
+            }
+            for file in self.files
+        ]
+        assumptions = list(self.assumptions)
+        return {"made_by": "python -m identification import", "assumptions": assumptions, "files": files}
 
 
 def read_files(
@@ -101,7 +119,13 @@ def read_files(
         content = read_mapping(Path(mapping))
     content = msgspec.structs.replace(content, gauge=gauge or content.gauge)
     sources = [read_source(Path(file)) for file in files]
-    _check_mapped_files(content, sources)
+    names = [source.path.name for source in sources]
+    for entry in content.recordings:
+        if entry not in names:
+            raise ImportingError(
+                f"the mapping file's recordings name {entry!r}, which is not among {', '.join(names)}: "
+                "give that file, too, or take it out"
+            )
     pressure = content.environment.pressure_bar if ambient_bar is None else ambient_bar
     temperature = content.environment.temperature_K if temperature_K is None else temperature_K
     given = None if pressure is None else round(pressure * BAR, 6)
@@ -117,16 +141,6 @@ def read_files(
     return ImportedCampaign(campaign=campaign, files=imported, assumptions=assumptions)
 
 
-def _check_mapped_files(content: MappingFile, sources: Sequence[SourceFile]) -> None:
-    names = {source.path.name for source in sources}
-    for name in content.recordings:
-        if name not in names:
-            raise ImportingError(
-                f"the mapping file's recordings name {name!r}, which is not among {', '.join(names)}: "
-                "give that file, too, or take it out"
-            )
-
-
 def _imported(
     source: SourceFile,
     content: MappingFile,
@@ -138,21 +152,16 @@ def _imported(
     gridded = on_common_grid(str(source.path), channels, rate)
     signals: dict[str, Any] = supply_pair_mean(gridded.signals)
     entry = content.recordings.get(source.path.name, RecordingEntry())
+    named_so = re.search("(?<![a-z])valid", source.path.stem.lower())
+    proposed = "validation" if named_so else "calibration"
     recording = Recording(
         name=entry.name or source.path.stem,
-        role=entry.role or _proposed_role(source.path, signals["U"]),
+        role=entry.role or (proposed if switches(signals["U"]) else "quality"),
         period=gridded.period,
         sigma_S=signals.get("sigma_S", np.zeros_like(signals["U"])),
         **{name: signals[name] for name in CHANNELS},
     )
     return ImportedFile(source=source, channels=tuple(channels), gridded=gridded, recording=recording)
-
-
-def _proposed_role(path: Path, U: NDArray) -> str:
-    """By the voltage, (samples,) [V], and the file's name."""
-    if not switches(U):
-        return "quality"
-    return "validation" if re.search("(?<![a-z])valid", path.stem.lower()) else "calibration"
 
 
 def _assumptions(
@@ -161,41 +170,16 @@ def _assumptions(
     pressure: float | None,
     temperature: float | None,
 ) -> tuple[str, ...]:
-    found = []
-    if pressure is None:
-        found.append(f"ambient pressure {USUAL_PRESSURE / BAR:g} bar (give --ambient-bar)")
-    if temperature is None:
-        found.append(f"ambient temperature {USUAL_TEMPERATURE:g} K (give --temperature-K)")
     silent = {c.source.name for f in files for c in f.channels if c.reference == "absolute, assumed"}
-    if silent:
-        found.append(f"{', '.join(sorted(silent))} absolute, since the unit does not say gauge")
     unsaid = [f for f in files if not content.recordings.get(f.source.path.name, RecordingEntry()).role]
-    if unsaid:
-        roles = ", ".join(f"{f.recording.name} {f.recording.role}" for f in unsaid)
-        found.append(f"roles by name and voltage: {roles}")
-    return tuple(found)
-
-
-def _file_provenance(file: ImportedFile) -> dict[str, Any]:
-    channels = {
-        channel.name: {
-            "source": channel.source.name,
-            "unit": channel.unit.text,
-            **({"reference": channel.reference} if channel.reference else {}),
-            "to_SI": channel.conversion,
-            "resampled": channel.name in file.gridded.resampled,
-            "held": channel.name in file.gridded.held,
-        }
-        for channel in file.channels
+    roles = ", ".join(f"{file.recording.name} {file.recording.role}" for file in unsaid)
+    sentences = {
+        f"ambient pressure {USUAL_PRESSURE / BAR:g} bar (give --ambient-bar)": pressure is None,
+        f"ambient temperature {USUAL_TEMPERATURE:g} K (give --temperature-K)": temperature is None,
+        f"{', '.join(sorted(silent))} absolute, since the unit does not say gauge": bool(silent),
+        f"roles by name and voltage: {roles}": bool(unsaid),
     }
-    return {
-        "recording": file.recording.name,
-        "source": file.source.path.name,
-        "sha256": file.source.sha256,
-        "format": file.source.format,
-        "rate_Hz": 1.0 / file.gridded.period,
-        "channels": channels,
-    }
+    return tuple(sentence for sentence, assumed in sentences.items() if assumed)
 
 
 def read_source(path: Path) -> SourceFile:
@@ -239,47 +223,46 @@ def source_table(source: SourceFile) -> str:
     """The channels of a file: name, unit, range, rate, and what its name means."""
     rows = []
     for channel in source.channels:
-        values = channel.known
-        span = f"{np.min(values):.5g} to {np.max(values):.5g}" if len(values) else "empty"
-        timed = channel.time is not None and len(channel.time) > 1 and np.ptp(channel.time) > 0
-        rate = f"{usual_rate(channel.time):.6g} Hz" if timed and channel.time is not None else ""
-        rows.append((source.label(channel), channel.unit, span, rate, meaning(channel) or ""))
-    heads = ("channel", "unit", "range", "rate", "proposed")
-    return f"{source.path} ({source.format})\n{_table(heads, rows)}"
+        known, time = channel.known, channel.time
+        rows.append(
+            {
+                "channel": source.label(channel),
+                "unit": channel.unit,
+                "range": f"{np.min(known):.5g} to {np.max(known):.5g}" if len(known) else "empty",
+                "rate": f"{usual_rate(time):.6g} Hz" if time is not None and np.ptp(time) > 0 else "",
+                "proposed": meaning(channel.name, channel.unit) or "",
+            }
+        )
+    return f"{source.path} ({source.format})\n{pd.DataFrame(rows).to_string(index=False)}"
 
 
 def import_text(imported: ImportedCampaign) -> str:
     """What every file becomes, and what was assumed."""
-    assumed = "\n".join(f"assumed: {sentence}" for sentence in imported.assumptions)
-    return "\n\n".join([*(_file_text(file) for file in imported.files), assumed])
-
-
-def _file_text(file: ImportedFile) -> str:
-    gridded = file.gridded
-    treated = dict.fromkeys(gridded.resampled, "resampled") | dict.fromkeys(gridded.held, "held")
-    rows = [
-        (
-            channel.name,
-            channel.source.name,
-            f"{channel.unit.text} {channel.reference}".strip(),
-            channel.conversion,
-            f"{usual_rate(channel.time):.6g} Hz",
-            treated.get(channel.name, "as recorded"),
-        )
-        for channel in file.channels
-    ]
-    recording = file.recording
-    title = (
-        f"{file.source.path.name} -> {recording.name}.csv, role {recording.role}, "
-        f"{len(recording)} samples at {1 / recording.period:.6g} Hz"
-    )
-    heads = ("becomes", "channel", "unit", "to SI", "rate", "samples")
-    told = "".join(f"\n{', '.join(names)}: {what}" for names, what in (
-        (gridded.resampled, "other times than the file's, low-pass filtered"),
-        (gridded.held, "other times than the file's, each sample is the last entry before it"),
-    ) if names)  # fmt: skip
-    return f"{title}\n{_table(heads, rows)}{told}"
-
-
-def _table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    return pd.DataFrame(rows, columns=list(heads)).to_string(index=False)
+    parts = []
+    for file in imported.files:
+        gridded, recording = file.gridded, file.recording
+        treated = dict.fromkeys(gridded.resampled, "resampled") | dict.fromkeys(gridded.held, "held")
+        rows = [
+            {
+                "becomes": channel.name,
+                "channel": channel.source.name,
+                "unit": f"{channel.unit.text} {channel.reference}".strip(),
+                "to SI": channel.conversion,
+                "rate": f"{usual_rate(channel.time):.6g} Hz",
+                "samples": treated.get(channel.name, "as recorded")
+                + (f", {channel.filled} missing filled" if channel.filled else ""),
+            }
+            for channel in file.channels
+        ]
+        lines = [
+            f"{file.source.path.name} -> {recording.name}.csv, role {recording.role}, "
+            f"{len(recording)} samples at {1 / recording.period:.6g} Hz",
+            pd.DataFrame(rows).to_string(index=False),
+        ]
+        for names, what in (
+            (gridded.resampled, "other times than the file's, low-pass filtered"),
+            (gridded.held, "other times than the file's, each sample is the last entry before it"),
+        ):
+            lines += [f"{', '.join(names)}: {what}"] if names else []
+        parts.append("\n".join(lines))
+    return "\n\n".join([*parts, "\n".join(f"assumed: {it}" for it in imported.assumptions)])

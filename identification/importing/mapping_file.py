@@ -46,9 +46,9 @@ NAMES: Mapping[str, tuple[str, ...]] = {name: (name.lower(),) for name in CHANNE
 """Names in lower case, without anything but letters and digits; English and German. A channel of the
 bench that is not listed has its own name."""
 
-INSIDE = r"(?:[^\[\](){}]|\([^()]{0,20}\)){1,30}?"
-BRACKETED = re.compile(rf"^(.*?)\s*(?:[\[({{]({INSIDE})[\])}}]|\s(?:in|/)\s(\S+)|/(\S+))\s*$")
-"""A name with its unit, of bounded length: "p1 [bar]", "p1 (bar(g))", "p1 in bar", "p1/bar"."""
+INSIDE = r"(?:[^\[\](){}]|\([^()]{0,20}\)|\[[^\[\]]{0,20}\]){1,30}?"
+BRACKETED = re.compile(rf"^(.*?)\s*(?:[\[({{]({INSIDE})[\])}}]|\s(?:in|/)\s(\S+(?:\s\S+)?)|/(\S+))\s*$")
+"""A name with its unit, of bounded length: "p1 [bar]", "p1 [bar[g]]", "p1 in bar rel.", "p1/bar"."""
 
 
 def split_name(name: str) -> tuple[str, str]:
@@ -65,14 +65,14 @@ def split_name(name: str) -> tuple[str, str]:
     return name, ""
 
 
-def meaning(channel: SourceChannel) -> str | None:
+def meaning(name: str, unit: str = "") -> str | None:
     """The channel of a recording that a channel's name and unit mean; None if they mean none."""
-    bare, inside = split_name(channel.name.split("\\")[0])
+    bare, inside = split_name(name.split("\\")[0])
     plain = re.sub(r"[^a-z0-9]", "", bare.rpartition(".")[2].lower())
-    unit = parsed_unit(channel.unit or inside)
-    for name, known in NAMES.items():
-        if plain in known and (unit is None or unit.quantity == QUANTITY[name]):
-            return name
+    parsed = parsed_unit(unit or inside)
+    for wanted, known in NAMES.items():
+        if plain in known and (parsed is None or parsed.quantity == QUANTITY[wanted]):
+            return wanted
     return None
 
 
@@ -80,7 +80,7 @@ def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]
     """The channels of a file that names and units propose, by what they mean; several: ambiguous."""
     found: dict[str, list[SourceChannel]] = {}
     for channel in channels:
-        name = meaning(channel) if channel.known.size else None
+        name = meaning(channel.name, channel.unit) if channel.known.size else None
         if name is not None:
             found.setdefault(name, []).append(channel)
     return found
@@ -140,7 +140,7 @@ class MappingFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
     format: str = FORMAT
     environment: Environment = msgspec.field(default_factory=Environment)
     channels: dict[str, ChannelEntry] = msgspec.field(default_factory=dict)
-    """By channel of the recording (channel_names.QUANTITY)."""
+    """By channel of the recording (QUANTITY)."""
     recordings: dict[str, RecordingEntry] = msgspec.field(default_factory=dict)
     """By the measurement file's name without its folder."""
     gauge: bool = False

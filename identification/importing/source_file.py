@@ -1,14 +1,12 @@
 """What a measurement file holds, before anybody has said what it means."""
 
 import importlib
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from types import ModuleType
 
 import numpy as np
-import pandas as pd
 from numpy.typing import NDArray
 
 from epv_env.common.extras import how_to_install
@@ -109,55 +107,3 @@ def needed_package(name: str, purpose: str) -> ModuleType:
         raise ImportingError(
             f"{purpose} need the package {package}, which is not installed: {how_to_install(EXTRA)}"
         ) from None
-
-
-STAMP = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d")
-"""Beginning of a date with a time of day (ISO 8601); a blank may stand for T."""
-
-
-def points_in_time(place: str, texts: Iterable[str | None]) -> NDArray:
-    """Texts as points in time, datetime64[ns], UTC where they name a zone; NaT for an empty text.
-
-    place: begins the message. Raises ImportingError for a text that is no point in time.
-    """
-    cells = [str(text or "").replace(",", ".") for text in texts]
-    try:
-        times = pd.to_datetime(cells, format="ISO8601", utc=True)
-    except ValueError as error:
-        raise ImportingError(
-            f"{place} has no point in time ({str(error).partition('. ')[0]}): write it as "
-            "2026-03-01T10:00:00.0005"
-        ) from None
-    return times.tz_localize(None).as_unit("ns").to_numpy()
-
-
-def seconds(values: NDArray) -> tuple[NDArray, np.datetime64 | None]:
-    """Numbers as they are, durations in seconds, points in time in seconds from the first; and that one.
-
-    values: (samples,) numbers, timedelta64 or datetime64; the first point in time is None for others.
-    """
-    second = np.timedelta64(1, "s")
-    if values.dtype.kind == "m":
-        return values / second, None
-    if values.dtype.kind != "M":
-        return np.asarray(values, dtype=float), None
-    known = values[~np.isnat(values)]
-    begin = known[0] if len(known) else np.datetime64("NaT")
-    return (values - begin) / second, begin
-
-
-def begin_offsets(place: str, begins: Sequence[np.datetime64 | None]) -> list[float]:
-    """What to add to the times of channels so that they count from one point in time [s].
-
-    place: begins the message. begins: the point in time of each channel's zero; None: not known. Raises
-    ImportingError if it is known of some channels only.
-    """
-    known = [begin for begin in begins if begin is not None]
-    if known and len(known) < len(begins):
-        raise ImportingError(
-            f"{place}: some channels have points in time and others only times from a start that the "
-            "file does not tell: export all with the same kind of time"
-        )
-    return [float((begin - min(known)) / np.timedelta64(1, "s")) for begin in known] or [0.0] * len(
-        begins
-    )

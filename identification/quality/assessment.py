@@ -104,25 +104,22 @@ def assess_recording(
 
 
 def sensor_offsets(quality: QualityAssessment) -> dict[str, SensorOffset]:
-    """Offset of each channel, which a calibration may subtract.
+    """Offset of each channel at time 0, where a drift starts; a calibration may subtract it.
 
     Empty unless the record is at rest: elsewhere nothing separates an offset from the signal.
     """
     if not quality.at_rest:
         return {}
-    return {name: _offset(channel) for name, channel in quality.channels.items()}
-
-
-def _offset(channel: ChannelAssessment) -> SensorOffset:
-    """Of the trend's line at time 0, since a drift starts with the recording.
-
-    Rounding errors that noise does not average out count as error of the offset.
-    """
-    size = UNITS[channel.name][1]
-    value = channel.trend.offset - channel.rest
-    scatter = channel.trend.offset_error if channel.moves else 0.0
-    lasting = 0.0 if channel.dithered else rounding_error(channel.quantum)
-    return SensorOffset(value=value * size, error=math.hypot(scatter, lasting) * size)
+    offsets = {}
+    for name, channel in quality.channels.items():
+        size, line = UNITS[name][1], channel.trend
+        scatter = float(line.intercept_stderr) if channel.moves else 0.0
+        lasting = (
+            0.0 if channel.dithered else rounding_error(channel.quantum)
+        )  # noise does not average it
+        error = math.hypot(scatter, lasting) * size
+        offsets[name] = SensorOffset(value=(float(line.intercept) - channel.rest) * size, error=error)
+    return offsets
 
 
 def white_noise_band(samples: int) -> float:

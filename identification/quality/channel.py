@@ -11,6 +11,7 @@ from scipy import stats
 from epv_env.plant.channels import Sensor
 from identification.readings_noise import quantisation_step, rounding_error
 from identification.recordings.recording import UNITS
+from identification.recordings.recording_checks import longest_run
 
 DRIFT_LEVELS = (0.1, 1.0)
 """Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""
@@ -18,27 +19,6 @@ LEAST_DITHER = 0.3
 """Noise in converter steps below which rounding errors no longer average out."""
 SIGNIFICANCE = 1e-4
 """Probability that the longest run of equal readings of a live channel is taken for a dead one."""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Trend:
-    """The straight line through a signal by linear least squares (Table 2).
-
-    A signal that never changes has no standard errors: they are NaN.
-    """
-
-    factor: float
-    """Slope [unit/s]."""
-    factor_error: float
-    """Standard error of the slope, for white noise [unit/s]."""
-    offset: float
-    """Value of the line at time 0 [unit]."""
-    offset_error: float
-    """Standard error of the offset, for white noise [unit]."""
-
-    def at(self, time: NDArray) -> NDArray:
-        """The line [unit] at some times (times,) [s], (times,)."""
-        return self.offset + self.factor * time
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,17 +52,6 @@ class DescriptiveStatistics:
     """Third moment about the mean over sigma cubed; 0 for a symmetric signal."""
 
 
-def fit_trend(time: NDArray, signal: NDArray) -> Trend:
-    """Line through a signal (samples,) [unit] over time (samples,) [s]; at least three samples."""
-    line: Any = stats.linregress(time, signal)
-    return Trend(
-        factor=float(line.slope),
-        factor_error=float(line.stderr),
-        offset=float(line.intercept),
-        offset_error=float(line.intercept_stderr),
-    )
-
-
 def descriptive_statistics(residual: NDArray, *, greatest: float) -> DescriptiveStatistics:
     """Table 3's statistics of a detrended signal, (samples,).
 
@@ -103,12 +72,6 @@ def descriptive_statistics(residual: NDArray, *, greatest: float) -> Descriptive
         kurtosis=float(stats.kurtosis(residual, fisher=False)) if moves else np.nan,
         skewness=float(stats.skew(residual)) if moves else np.nan,
     )
-
-
-def longest_run(readings: NDArray) -> int:
-    """Length of the longest run of one and the same reading [samples]; readings: (samples,)."""
-    changes = np.flatnonzero(np.diff(readings) != 0)
-    return int(np.max(np.diff(np.concatenate(([-1], changes, [len(readings) - 1])))))
 
 
 def run_limit(readings: NDArray, rounding: float) -> int:
@@ -141,7 +104,9 @@ class ChannelAssessment:
     """Of the record [s]."""
     rest: float
     """What a perfect sensor reads with the coil off and the chambers vented [A, V or bar]."""
-    trend: Trend
+    trend: Any
+    """The line through the readings by least squares (Table 2), from `scipy.stats.linregress`, with
+    standard errors for white noise [unit, unit/s]."""
     description: DescriptiveStatistics
     quantum: float
     """Step of the readings: as they show it, otherwise as the campaign does; 0.0 without a grid."""
@@ -159,11 +124,6 @@ class ChannelAssessment:
         return bool(np.ptp(self.readings) > 0)
 
     @property
-    def accuracy(self) -> float:
-        """What the supplier allows a reading to be off (Table 1) [unit]."""
-        return self.sensor.accuracy * self.sensor.high
-
-    @property
     def offset(self) -> float:
         """Mean reading minus rest value [unit]; an offset error only if the record is at rest."""
         return float(np.mean(self.readings)) - self.rest
@@ -171,17 +131,17 @@ class ChannelAssessment:
     @property
     def drift(self) -> float:
         """Change of the line over the record [unit]."""
-        return self.trend.factor * self.duration
+        return float(self.trend.slope) * self.duration
 
     @property
     def within_accuracy(self) -> bool:
         """Whether the line stays within the accuracy of the rest value from start to end."""
-        return abs(self.offset) + abs(self.drift) / 2 <= self.accuracy
+        return abs(self.offset) + abs(self.drift) / 2 <= self.sensor.margin
 
     @property
     def at_rest(self) -> bool:
         """Whether the channel is steady, and within the accuracy of its rest value."""
-        return self.within_accuracy and abs(self.drift) < DRIFT_LEVELS[0] * self.accuracy
+        return self.within_accuracy and abs(self.drift) < DRIFT_LEVELS[0] * self.sensor.margin
 
     @property
     def usual_noise(self) -> float:
@@ -197,7 +157,7 @@ class ChannelAssessment:
     @property
     def stands_still(self) -> tuple[int, int] | None:
         """Longest run of one reading and its limit [samples]; None if independent noise explains it."""
-        longest = longest_run(self.readings)
+        longest = longest_run(np.diff(self.readings) == 0)[1] + 1
         limit = run_limit(self.readings, self.quantum / self.description.standard_deviation)
         return (longest, limit) if longest > limit else None
 
@@ -216,9 +176,9 @@ def assess_channel(
         sensor: of the channel.
     """
     time = np.arange(len(readings)) * period
-    trend = fit_trend(time, readings)
-    moves = np.ptp(readings) > 0
-    residual = readings - trend.at(time) if moves else np.zeros_like(readings)
+    trend: Any = stats.linregress(time, readings)
+    line = trend.intercept + trend.slope * time
+    residual = readings - line if np.ptp(readings) > 0 else np.zeros_like(readings)
     return ChannelAssessment(
         name=name,
         readings=readings,

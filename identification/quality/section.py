@@ -17,7 +17,6 @@ from identification.report.signals import over_time
 UNIT_COLUMNS = [f"{name} [{UNITS[name][0]}]" for name in CHANNELS]
 """Headings of a table with a column per channel."""
 
-
 OTHER_NAMES = {"trimmed_mean": "trimmed mean [by 5 %]", "signal_to_noise": "SNR [dB]"}
 """Of statistics that people call otherwise than their fields."""
 
@@ -45,7 +44,7 @@ def signals(quality: QualityAssessment) -> Figure:
         {
             f"{channel.name} [{channel.unit}]": {
                 "readings": channel.readings,
-                "trend": channel.trend.at(time),
+                "trend": channel.trend.intercept + channel.trend.slope * time,
             }
             for channel in quality.channels.values()
         },
@@ -66,19 +65,22 @@ def _state(quality: QualityAssessment) -> str:
 
 
 def _trends(quality: QualityAssessment) -> Table:
-    trends = [quality.channels[name].trend for name in CHANNELS]
-    slopes = [_estimate(trend.factor, trend.factor_error) for trend in trends]
-    offsets = [_estimate(trend.offset, trend.offset_error) for trend in trends]
-    rows = [["factor [unit/s]", *slopes], ["offset [unit]", *offsets]]
+    rows = []
+    for title, value, error in (
+        ("factor [unit/s]", "slope", "stderr"), ("offset [unit]", "intercept", "intercept_stderr")
+    ):  # fmt: skip
+        row = [title]
+        for name in CHANNELS:
+            trend = quality.channels[name].trend
+            scatter = getattr(trend, error)
+            shown = f" ± {scatter:.6f}" if math.isfinite(scatter) else ""
+            row.append(f"{getattr(trend, value):z.6f}{shown}")
+        rows.append(row)
     return Table(
         columns=["Parameter", *UNIT_COLUMNS],
         rows=rows,
         caption="Signal offset and trend check, ± one standard error.",
     )
-
-
-def _estimate(value: float, error: float) -> str:
-    return f"{value:z.6f} ± {error:.6f}" if math.isfinite(error) else f"{value:z.6f}"
 
 
 def _statistics(quality: QualityAssessment) -> Table:
@@ -106,34 +108,36 @@ def _correlations(quality: QualityAssessment) -> Table:
 
 def as_json(quality: QualityAssessment) -> dict[str, Any]:
     """Figures in A, V and bar (sensor_offsets in SI units) and findings; None for what is undefined."""
+    channels = {}
+    for name, channel in quality.channels.items():
+        results, trend = check_results(quality, name), channel.trend
+        line = {
+            "factor": trend.slope, "factor_error": trend.stderr,
+            "offset": trend.intercept, "offset_error": trend.intercept_stderr,
+        }  # fmt: skip
+        channels[name] = {
+            "unit": channel.unit,
+            "status": worst_status(results),
+            "findings": [
+                {"check": check, "status": result.status, "text": result.text}
+                for check, result in results.items()
+            ],
+            "trend": _finite({key: float(value) for key, value in line.items()}),
+            "statistics": _finite(asdict(channel.description)),
+            "offset": channel.offset,
+            "quantum": channel.quantum,
+        }
     return {
         "recording": quality.name,
         "samples": quality.samples,
         "period_s": quality.period,
         "at_rest": quality.at_rest,
         "sensor_offsets_SI": {n: _finite(asdict(o)) for n, o in sensor_offsets(quality).items()},
-        "channels": {name: _channel_json(quality, name) for name in CHANNELS},
+        "channels": channels,
         "correlations": [
             {"channels": list(pair), "correlation": value}
             for pair, value in quality.correlations.items()
         ],
-    }
-
-
-def _channel_json(quality: QualityAssessment, name: str) -> dict[str, Any]:
-    channel = quality.channels[name]
-    results = check_results(quality, name)
-    return {
-        "unit": channel.unit,
-        "status": worst_status(results),
-        "findings": [
-            {"check": check, "status": result.status, "text": result.text}
-            for check, result in results.items()
-        ],
-        "trend": _finite(asdict(channel.trend)),
-        "statistics": _finite(asdict(channel.description)),
-        "offset": channel.offset,
-        "quantum": channel.quantum,
     }
 
 

@@ -30,17 +30,17 @@ class Judgement(NamedTuple):
     """One sentence: the figures and, unless good, what to do."""
 
 
-def graded_status(value: float, levels: tuple[float, float]) -> str:
+def _graded(value: float, levels: tuple[float, float]) -> str:
     """Good below the first level, bad from the second on, in doubt between."""
     return SEVERITY[1 + sum(value >= limit for limit in levels)]
 
 
-def judgement_of(status: str, figures: str, advice: str) -> Judgement:
+def _judged(status: str, figures: str, advice: str) -> Judgement:
     """The figures and, unless all is well, what to do."""
     return Judgement(status, figures if status == "good" else f"{figures}; {advice}")
 
 
-def milli_text(channel: ChannelAssessment, value: float) -> str:
+def _milli(channel: ChannelAssessment, value: float) -> str:
     """A small value in mA, mV or mbar."""
     return f"{1e3 * value:.3g} m{channel.unit}"
 
@@ -49,27 +49,24 @@ def check_offset(quality: QualityAssessment, channel: ChannelAssessment) -> Judg
     """Is the mean reading within Table 1's accuracy of the rest value?"""
     pressure = channel.name in PRESSURES
     if not (quality.vented if pressure else quality.coil_off):
-        return _no_offset(channel, "the chambers are not vented" if pressure else "the coil is on")
-    return judgement_of(
-        "good" if abs(channel.offset) <= channel.accuracy else "bad",
-        f"offset {milli_text(channel, channel.offset)} against an accuracy of "
-        f"±{milli_text(channel, channel.accuracy)}",
+        reason = "the chambers are not vented" if pressure else "the coil is on"
+        mean = f"the mean reading is {channel.rest + channel.offset:.4g} {channel.unit}, but {reason}"
+        return Judgement("note", f"{mean}, so no offset can be read off; record at rest for it")
+    return _judged(
+        "good" if abs(channel.offset) <= channel.sensor.margin else "bad",
+        f"offset {_milli(channel, channel.offset)} against an accuracy of "
+        f"±{_milli(channel, channel.sensor.margin)}",
         f"{'vent this chamber' if pressure else 'switch the coil off'} and record again, "
         "or have the sensor calibrated",
     )
 
 
-def _no_offset(channel: ChannelAssessment, reason: str) -> Judgement:
-    mean = f"the mean reading is {channel.rest + channel.offset:.4g} {channel.unit}, but {reason}"
-    return Judgement("note", f"{mean}, so no offset can be read off; record at rest for it")
-
-
 def check_trend(quality: QualityAssessment, channel: ChannelAssessment) -> Judgement:
     """Is the drift over the record small against the accuracy?"""
-    ratio = abs(channel.drift) / channel.accuracy
-    return judgement_of(
-        graded_status(ratio, DRIFT_LEVELS),
-        f"drift {milli_text(channel, channel.drift)} in {channel.duration:.3g} s, "
+    ratio = abs(channel.drift) / channel.sensor.margin
+    return _judged(
+        _graded(ratio, DRIFT_LEVELS),
+        f"drift {_milli(channel, channel.drift)} in {channel.duration:.3g} s, "
         f"{100 * ratio:.2g} % of the accuracy",
         "let the bench settle, look for a leak or a warming sensor, and record again",
     )
@@ -79,16 +76,16 @@ def check_noise(quality: QualityAssessment, channel: ChannelAssessment) -> Judge
     """Is the noise as small as the report's, but not so small that the unit must be wrong?"""
     deviation = channel.description.standard_deviation
     ratio = deviation / channel.usual_noise
-    quiet = graded_status(1.0 / max(ratio, 1e-9), QUIET_LEVELS)
+    quiet = _graded(1.0 / max(ratio, 1e-9), QUIET_LEVELS)
     if channel.dithered and quiet != "good":
         return Judgement(
             quiet,
-            f"noise {milli_text(channel, deviation)}, only {ratio:.2g} times the usual; check the unit "
+            f"noise {_milli(channel, deviation)}, only {ratio:.2g} times the usual; check the unit "
             "and scaling of the channel, since a reading too small has noise too small",
         )
-    return judgement_of(
-        graded_status(ratio, NOISE_LEVELS),
-        f"noise {milli_text(channel, deviation)}, {ratio:.2f} times the usual, "
+    return _judged(
+        _graded(ratio, NOISE_LEVELS),
+        f"noise {_milli(channel, deviation)}, {ratio:.2f} times the usual, "
         f"signal-to-noise ratio {channel.description.signal_to_noise:.1f} dB",
         "check shielding, ground and supply of the sensor",
     )
@@ -99,25 +96,25 @@ def check_resolution(quality: QualityAssessment, channel: ChannelAssessment) -> 
     if not channel.moves:
         figures = f"every sample reads {channel.readings[0]:.6g} {channel.unit}"
         if not channel.quantum:
-            return judgement_of("bad", figures, "check the sensor's cable and the acquisition")
-        return judgement_of(
+            return _judged("bad", figures, "check the sensor's cable and the acquisition")
+        return _judged(
             "doubt",
-            f"{figures}, in steps of {milli_text(channel, channel.quantum)}, which may hide the noise "
+            f"{figures}, in steps of {_milli(channel, channel.quantum)}, which may hide the noise "
             "of a live sensor",
             "record with finer steps, since a dead sensor would read the same",
         )
     if run := channel.stands_still:
         still, allowed = (1e3 * quality.period * samples for samples in run)
-        return judgement_of(
+        return _judged(
             "bad",
             f"one reading lasts {still:.3g} ms, where independent noise stays below {allowed:.3g} ms",
             "check the sensor's cable, its range and the acquisition",
         )
     ratio = channel.quantum / channel.sensor.resolution
     steps = channel.description.standard_deviation / channel.quantum if channel.quantum else np.inf
-    return judgement_of(
+    return _judged(
         "doubt" if ratio > COARSE_STEP or not channel.dithered else "good",
-        f"one step is {milli_text(channel, channel.quantum)}, {ratio:.2f} times the usual range in 12 "
+        f"one step is {_milli(channel, channel.quantum)}, {ratio:.2f} times the usual range in 12 "
         f"bits, and the noise is {steps:.2g} steps",
         "check the converter's range and bits, since rounding errors do not average out",
     )

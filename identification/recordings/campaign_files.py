@@ -2,10 +2,10 @@
 
 import hashlib
 import os
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from os import PathLike
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import msgspec
 import numpy as np
@@ -15,7 +15,14 @@ from epv_env.common.files import JSONFileError, read_bytes, read_json, write_jso
 from epv_env.common.units import BAR
 from epv_env.plant.channels import CHANNEL, MEASURED_CHANNELS
 from epv_env.plant.parameters import ParameterError, checked_value
-from identification.recordings.columns import CONSUMPTION_COLUMN, TIME_COLUMN, read_columns
+from identification.recordings.columns import (
+    CHANNEL_OF,
+    CONSUMPTION_COLUMN,
+    REQUIRED_COLUMNS,
+    SUPPLY_COLUMNS,
+    TIME_COLUMN,
+    read_columns,
+)
 from identification.recordings.noise import column_steps
 from identification.recordings.recording import CHANNELS, ROLES, Campaign, CampaignError, Recording
 from identification.recordings.recording_checks import check_recording
@@ -60,17 +67,15 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
     """The campaign in a folder, every rule of docs/reference/files.md checked. Raises CampaignError."""
     folder = Path(folder)
     remedy = "give the folder of a campaign, or write the file as docs/reference/files.md shows"
-    try:
-        manifest = read_json(folder / FILE_NAME, _Manifest, version=FORMAT, remedy=remedy)
-    except JSONFileError as error:
-        raise CampaignError(str(error)) from None
+    manifest = read_manifest(folder / FILE_NAME, _Manifest, FORMAT, remedy)
     temperature, pressure = checked_ambient(folder / FILE_NAME, manifest.environment)
     roles = _roles(folder, manifest)
-    files = {path: _read_file(path) for path in roles}
-    steps = column_steps([columns for _, columns in files.values()], rules)
+    contents = {path: content_of(path) for path in roles}
+    files = {path: _columns_of(str(path), content) for path, content in contents.items()}
+    steps = column_steps(list(files.values()), rules)
     recordings = []
     for path, role in roles.items():
-        sha256, columns = files[path]
+        sha256, columns = hashlib.sha256(contents[path]).hexdigest(), files[path]
         period = check_recording(str(path), columns, role, pressure / BAR, steps, rules)
         signals = {
             c.name: np.mean([columns[n] for n in c.columns if n in columns], axis=0) * c.scale
@@ -88,6 +93,39 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
         folder=folder,
         rules=rules,
     )
+
+
+Manifest = TypeVar("Manifest")
+
+
+def read_manifest(path: Path, shape: type[Manifest], version: str, remedy: str) -> Manifest:
+    """The JSON file of a folder. Raises CampaignError."""
+    try:
+        return read_json(path, shape, version=version, remedy=remedy)
+    except JSONFileError as error:
+        raise CampaignError(str(error)) from None
+
+
+def content_of(path: Path) -> bytes:
+    """The bytes of a file that a folder's JSON names. Raises CampaignError."""
+    try:
+        return read_bytes(path)
+    except OSError as error:
+        raise CampaignError(
+            f"{path} cannot be read ({error.strerror}): add the file, or take it out of the JSON file"
+        ) from None
+
+
+def _columns_of(file: str, content: bytes) -> dict[str, NDArray]:
+    """A recording's columns by name, each (samples,) in the unit of the name. Raises CampaignError."""
+    columns = read_columns(file, content, REQUIRED_COLUMNS, (*CHANNEL_OF, CONSUMPTION_COLUMN))
+    supply = tuple(name for way in SUPPLY_COLUMNS for name in way if name in columns)
+    if supply not in SUPPLY_COLUMNS:
+        raise CampaignError(
+            f"{file}, line 1: p1 is given by {' and '.join(supply) or 'no column'}: give p1_bar, or "
+            "both p1a_bar and p1b_bar, not a mixture"
+        )
+    return columns
 
 
 def check_vacant(folder: Path) -> None:
@@ -130,7 +168,16 @@ def check_campaign(campaign: Campaign, folder: Path) -> list[tuple[Recording, di
     _roles(folder, manifest)
     written = [(recording, _columns(recording)) for recording in campaign.recordings]
     for recording, columns in written:
-        _check_writable(folder / f"{recording.name}.csv", recording, columns)
+        if (folder / f"{recording.name}.csv").stem != recording.name:
+            raise CampaignError(
+                f"recording {recording.name!r} does not name a file: give it a name without folders"
+            )
+        for name, values in columns.items():
+            if values.shape != (len(recording),) or not np.all(np.isfinite(values)):
+                raise CampaignError(
+                    f"{folder / recording.name}.csv: {name} has shape {values.shape} or a value that is "
+                    f"not finite: give {len(recording)} finite samples"
+                )
     steps = column_steps([columns for _, columns in written], campaign.rules)
     for recording, columns in written:
         path = str(folder / f"{recording.name}.csv")
@@ -167,55 +214,44 @@ def checked_ambient(file: Path, environment: Environment) -> tuple[float, float]
 
 def _roles(folder: Path, manifest: _Manifest) -> dict[Path, str]:
     """Each recording's role by the path of its file, which lies in the campaign's folder."""
-    if not manifest.recordings:
-        raise CampaignError(
-            f"{folder / FILE_NAME}: recordings is empty: name at least one file and its role"
-        )
-    roles: dict[Path, str] = {}
+    file = folder / FILE_NAME
+    paths = named_files(file, "recordings", [entry.file for entry in manifest.recordings])
     for number, entry in enumerate(manifest.recordings, start=1):
-        place = f"{folder / FILE_NAME}, recording {number}"
-        path = _inside(place, folder, entry.file)
         if entry.role not in ROLES:
             raise CampaignError(
-                f"{place}: unknown role {entry.role!r}: choose one of {', '.join(ROLES)}"
+                f"{file}, recording {number}: unknown role {entry.role!r}: choose one of "
+                f"{', '.join(ROLES)}"
             )
-        _check_new(place, path, roles)
-        roles[path] = entry.role
-    return roles
+    return dict(zip(paths, (entry.role for entry in manifest.recordings), strict=True))
 
 
-def _inside(place: str, folder: Path, name: str) -> Path:
-    """The path of a file that lies in the folder, however it is written or linked."""
-    try:
-        path = folder / name
-        if path.resolve().is_relative_to(folder.resolve()):
-            return path
-    except (OSError, ValueError, RuntimeError):  # a path the system cannot hold, a loop of links
-        pass
-    raise CampaignError(
-        f"{place}: file {name!r} leaves the campaign's folder: copy it there and give its name"
-    )
+def named_files(manifest: Path, field: str, names: Sequence[str]) -> list[Path]:
+    """Paths of the files that a folder's JSON names: some, each once, all of them in the folder.
 
-
-def _check_new(place: str, path: Path, earlier: Iterable[Path]) -> None:
-    """Files, and the names of recordings that come from them, occur once."""
-    for other in earlier:
-        if path.resolve() == other.resolve() or path.stem == other.stem:
+    Names of recordings come from names of files, which therefore differ without folder and suffix, too.
+    manifest: the JSON file. field: of its list. Raises CampaignError.
+    """
+    folder, paths = manifest.parent, list[Path]()
+    if not names:
+        raise CampaignError(f"{manifest}: {field} is empty: name at least one file")
+    for number, name in enumerate(names, start=1):
+        place, path = f"{manifest}, {field.removesuffix('s')} {number}", folder / name
+        try:
+            inside = path.resolve().is_relative_to(folder.resolve())
+        except (OSError, ValueError, RuntimeError):  # a path the system cannot hold, a loop of links
+            inside = False
+        if not inside:
             raise CampaignError(
-                f"{place}: {path.name} is named twice, after {other.name}: name each file once, and "
-                "rename files that differ in folder or suffix only"
+                f"{place}: file {name!r} leaves the folder: copy it there and give its name"
             )
-
-
-def _read_file(path: Path) -> tuple[str, dict[str, NDArray]]:
-    """SHA-256 of a file, and its columns by name, each (samples,) in the unit of the name."""
-    try:
-        content = read_bytes(path)
-    except OSError as error:
-        raise CampaignError(
-            f"{path} cannot be read ({error.strerror}): add the file, or take it out of {FILE_NAME}"
-        ) from None
-    return hashlib.sha256(content).hexdigest(), read_columns(str(path), content)
+        for other in paths:
+            if path.resolve() == other.resolve() or path.stem == other.stem:
+                raise CampaignError(
+                    f"{place}: {path.name} is named twice, after {other.name}: name each file once, and "
+                    "rename files that differ in folder or suffix only"
+                )
+        paths.append(path)
+    return paths
 
 
 def _columns(recording: Recording) -> dict[str, NDArray]:
@@ -226,16 +262,3 @@ def _columns(recording: Recording) -> dict[str, NDArray]:
     if np.any(recording.sigma_S):
         columns[CONSUMPTION_COLUMN] = recording.sigma_S
     return {name: np.round(values, DECIMALS[name]) for name, values in columns.items()}
-
-
-def _check_writable(path: Path, recording: Recording, columns: Mapping[str, NDArray]) -> None:
-    if path.stem != recording.name:
-        raise CampaignError(
-            f"recording {recording.name!r} does not name a file: give it a name without folders"
-        )
-    for name, values in columns.items():
-        if values.shape != (len(recording),) or not np.all(np.isfinite(values)):
-            raise CampaignError(
-                f"{path}: {name} has shape {values.shape} or a value that is not finite: give "
-                f"{len(recording)} finite samples"
-            )

@@ -3,7 +3,7 @@
 import io
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 import pandas as pd
@@ -27,9 +27,6 @@ REQUIRED_COLUMNS = (
 SUPPLY_COLUMNS = (P1.columns[:1], P1.columns[1:])
 """The two ways to give p1: one column, or the two reservoirs' sensors."""
 
-KNOWN_COLUMNS = (TIME_COLUMN, *CHANNEL_OF, CONSUMPTION_COLUMN)
-"""Columns that are read; others are ignored."""
-
 LEAST_RATE = 500.0
 """Least sampling rate [1/s]: a slower bench misses the armature's movement."""
 
@@ -45,33 +42,30 @@ def line_number(sample: int) -> int:
     return sample + 2
 
 
-def read_columns(file: str, content: bytes) -> dict[str, NDArray]:
-    """The known columns of a CSV file (RFC 4180, UTF-8), each (samples,), in the order of the file.
+def read_columns(
+    file: str, content: bytes, required: Sequence[str], optional: Collection[str] = ()
+) -> dict[str, NDArray]:
+    """These columns of a CSV file (RFC 4180, UTF-8), each (samples,), in the order of the file.
 
-    file: what messages call it. The unit of each column is in its name. Columns that are not
-    KNOWN_COLUMNS are ignored. Raises CampaignError.
+    file: what messages call it. The unit of each column is in its name. Other columns are ignored.
+    Raises CampaignError.
     """
     cells = _cells(file, content)
     names = [name.strip() for name in cells.iloc[0].fillna("")] if len(cells) else []
-    _check_names(f"{file}, line 1", names)
-    return {
-        name: _numbers(file, name, cells.iloc[1:, place].to_numpy())
-        for place, name in enumerate(names)
-        if name in KNOWN_COLUMNS
-    }
-
-
-def read_named_columns(file: str, content: bytes, wanted: Sequence[str]) -> dict[str, NDArray]:
-    """Columns of a CSV file by name, each (samples,); others are ignored. Raises CampaignError."""
-    cells = _cells(file, content)
-    names = [name.strip() for name in cells.iloc[0].fillna("")] if len(cells) else []
-    missing = [name for name in wanted if names.count(name) != 1]
+    for name, count in Counter(names).items():
+        if count > 1:
+            raise CampaignError(f"{file}, line 1: column {name!r} stands twice: keep one of them")
+    missing = [name for name in required if name not in names]
     if missing:
         raise CampaignError(
-            f"{file}, line 1: {missing[0]} stands {names.count(missing[0])} times in the header: give "
-            f"the columns {','.join(wanted)} once each"
+            f"{file}, line 1: missing {', '.join(missing)} in the header {','.join(names)[:120]!r}: "
+            "name these columns as docs/reference/files.md does, separated by commas"
         )
-    return {name: _numbers(file, name, cells.iloc[1:, names.index(name)].to_numpy()) for name in wanted}
+    return {
+        name: _numbers(file, name, cells.iloc[1:, place])
+        for place, name in enumerate(names)
+        if name in required or name in optional
+    }
 
 
 def _cells(file: str, content: bytes) -> pd.DataFrame:
@@ -97,43 +91,18 @@ def _cells(file: str, content: bytes) -> pd.DataFrame:
         ) from None
 
 
-def _check_names(place: str, names: Sequence[str]) -> None:
-    for name, count in Counter(names).items():
-        if count > 1:
-            raise CampaignError(f"{place}: column {name!r} stands twice: keep one of them")
-    missing = [name for name in REQUIRED_COLUMNS if name not in names]
-    if missing:
-        raise CampaignError(
-            f"{place}: missing {', '.join(missing)} in the header {','.join(names)[:120]!r}: "
-            "name these columns as docs/reference/files.md does, separated by commas"
-        )
-    given = tuple(name for way in SUPPLY_COLUMNS for name in way if name in names)
-    if given not in SUPPLY_COLUMNS:
-        raise CampaignError(
-            f"{place}: p1 is given by {' and '.join(given) or 'no column'}: "
-            "give p1_bar, or both p1a_bar and p1b_bar, not a mixture"
-        )
-
-
-def _numbers(file: str, name: str, cells: NDArray) -> NDArray:
+def _numbers(file: str, name: str, cells: pd.Series) -> NDArray:
     """The numbers of a column's cells, (samples,); the first cell without one is named."""
-    values = np.array([_number(str(cell)) for cell in cells], dtype=float)
+    values = np.asarray(pd.to_numeric(cells, errors="coerce"), dtype=float)
     wrong = np.flatnonzero(~np.isfinite(values))
     if wrong.size:
-        cell = cells[wrong[0]]
+        cell = cells.iloc[wrong[0]]
         shown = repr(cell[:40]) if isinstance(cell, str) and cell.strip() else "empty"
         raise CampaignError(
             f"{file}, line {line_number(wrong[0])}: {name} is {shown}, not a finite number: give one "
             "with '.' as decimal sign, or cut the recording before this line"
         )
     return values
-
-
-def _number(cell: str) -> float:
-    try:
-        return np.nan if "_" in cell else float(cell)  # Python's own 1_000 is no CSV number
-    except ValueError:
-        return np.nan
 
 
 def sampling_period(file: str, time: NDArray) -> float:
@@ -147,12 +116,41 @@ def sampling_period(file: str, time: NDArray) -> float:
             f"{file}, line {line_number(len(time))}: the file ends after {len(time)} samples, too few "
             "to tell the sampling rate: record for longer"
         )
-    _check_order(file, time)
-    _check_gaps(file, time)
-    least, greatest = _explaining_periods(time)
+    if abs(time[0]) > 1e-9:
+        raise CampaignError(
+            f"{file}, line {line_number(0)}: {TIME_COLUMN} starts at {time[0]:g} and must start at 0: "
+            "subtract the first time from all"
+        )
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    backward = np.flatnonzero(steps <= 0)
+    odd = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual + 1e-9)
+    if backward.size or odd.size:
+        sample = backward[0] if backward.size else odd[0]
+        rule = f"must be uniform, in steps of {usual:g}: cut the recording there, or print more digits"
+        rule = (
+            "must increase: sort the samples, give each once, or print more digits"
+            if backward.size
+            else rule
+        )
+        raise CampaignError(
+            f"{file}, line {line_number(sample + 1)}: {TIME_COLUMN} goes from {time[sample]:.9g} to "
+            f"{time[sample + 1]:.9g} and {rule}"
+        )
+    rounding = 0.5 * last_digit(time) + HARMLESS_JITTER * usual
+    count = np.arange(
+        1, len(time)
+    )  # time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k
+    least, greatest = np.max((time[1:] - rounding) / count), np.min((time[1:] + rounding) / count)
     if least > greatest:
-        _refuse_jitter(file, time)
-    return roundest(least, greatest)
+        uniform = np.linspace(0.0, time[-1], len(time))
+        worst = int(np.argmax(np.abs(time - uniform)))
+        raise CampaignError(
+            f"{file}, line {line_number(worst)}: {TIME_COLUMN} is {time[worst]:.9g} where uniform "
+            f"sampling has {uniform[worst]:.9g}, which rounding to the printed digits does not explain: "
+            "resample to a uniform rate"
+        )
+    return roundest(float(least), float(greatest))
 
 
 def check_rate(file: str, period: float) -> None:
@@ -162,60 +160,6 @@ def check_rate(file: str, period: float) -> None:
             f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at "
             f"{LEAST_RATE:g} Hz or faster"
         )
-
-
-def _check_order(file: str, time: NDArray) -> None:
-    if abs(time[0]) > 1e-9:
-        raise CampaignError(
-            f"{file}, line {line_number(0)}: {TIME_COLUMN} starts at {time[0]:g} and must start at 0: "
-            "subtract the "
-            "first time from all"
-        )
-    backward = np.flatnonzero(np.diff(time) <= 0)
-    if backward.size:
-        rule = "must increase: sort the samples, give each once, or print more digits"
-        _refuse_step(file, time, backward[0], rule)
-
-
-def _check_gaps(file: str, time: NDArray) -> None:
-    steps = np.diff(time)
-    usual = float(np.median(steps))
-    odd = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual + 1e-9)
-    if odd.size:
-        rule = f"must be uniform, in steps of {usual:g}: cut the recording there, or print more digits"
-        _refuse_step(file, time, odd[0], rule)
-
-
-def _refuse_step(file: str, time: NDArray, sample: int, rule: str) -> None:
-    raise CampaignError(
-        f"{file}, line {line_number(sample + 1)}: {TIME_COLUMN} goes from {time[sample]:.9g} to "
-        f"{time[sample + 1]:.9g} and {rule}"
-    )
-
-
-def _refuse_jitter(file: str, time: NDArray) -> None:
-    uniform = np.linspace(0.0, time[-1], len(time))
-    worst = int(np.argmax(np.abs(time - uniform)))
-    raise CampaignError(
-        f"{file}, line {line_number(worst)}: {TIME_COLUMN} is {time[worst]:.9g} where uniform "
-        "sampling has "
-        f"{uniform[worst]:.9g}, which rounding to the printed digits does not explain: resample to a "
-        "uniform rate"
-    )
-
-
-def _explaining_periods(time: NDArray) -> tuple[float, float]:
-    """Ends of the range of periods with which every time is right up to its rounding [s].
-
-    Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k; the first end lies above the
-    second where nothing explains all.
-    """
-    rounding = 0.5 * last_digit(time) + HARMLESS_JITTER * float(np.median(np.diff(time)))
-    count = np.arange(1, len(time))
-    return (
-        float(np.max((time[1:] - rounding) / count)),
-        float(np.min((time[1:] + rounding) / count)),
-    )
 
 
 def last_digit(time: NDArray) -> float:

@@ -9,11 +9,16 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
-from epv_env.common.files import JSONFileError, read_bytes, read_json
 from epv_env.common.units import BAR
 from epv_env.operation_log import DECIMALS, FILE_NAME, FORMAT
-from identification.recordings.campaign_files import Environment, checked_ambient
-from identification.recordings.columns import line_number, read_named_columns, sampling_period
+from identification.recordings.campaign_files import (
+    Environment,
+    checked_ambient,
+    content_of,
+    named_files,
+    read_manifest,
+)
+from identification.recordings.columns import line_number, read_columns, sampling_period
 from identification.recordings.plausibility import check_units, gauge_contradiction
 from identification.recordings.recording import HOLD, CampaignError
 from identification.recordings.recording_checks import check_range
@@ -24,7 +29,7 @@ PERIOD_TOLERANCE = 1e-3
 REST = 0.05
 """Relative range of p3 within HOLD up to which the control chamber is at rest [-]."""
 LONGEST = 0.6
-"""Time after a switching-off that is looked at [s]."""
+"""Longest opening [s]: a longer one tells less and takes longer to simulate."""
 MOST_CHECKED = 20
 """Openings of a drive that are checked, evenly over the drive."""
 LEAST_FALLING = 8
@@ -94,47 +99,44 @@ def read_log(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Log:
 
     rules: what readings of its valve can be.
     """
-    folder = Path(folder)
+    file = Path(folder) / FILE_NAME
     remedy = "give the folder of an operation log (docs/reference/files.md)"
-    try:
-        manifest = read_json(folder / FILE_NAME, _Manifest, version=FORMAT, remedy=remedy)
-    except JSONFileError as error:
-        raise CampaignError(str(error)) from None
-    temperature, pressure = checked_ambient(folder / FILE_NAME, manifest.environment)
-    files = [entry.file for entry in manifest.drives]
-    if not files:
-        raise CampaignError(f"{folder / FILE_NAME}: drives is empty: name at least one file")
-    twice = next((file for file in files if files.count(file) > 1), None)
-    if twice is not None:
-        raise CampaignError(f"{folder / FILE_NAME}: drives names {twice} twice: name each file once")
+    manifest = read_manifest(file, _Manifest, FORMAT, remedy)
+    temperature, pressure = checked_ambient(file, manifest.environment)
     period = manifest.control_period_s
-    columns = {file: _columns(folder, file, period) for file in files}
-    for file, own in columns.items():
-        _check_readings(str(folder / file), own, period, pressure / BAR, rules)
-    _check_reference(folder, list(columns.values()), period, pressure / BAR)
+    columns = {
+        path: _columns(path, period)
+        for path in named_files(file, "drives", [entry.file for entry in manifest.drives])
+    }
+    for path, drive in columns.items():
+        _check_readings(str(path), drive, period, pressure / BAR, rules)
+    _check_reference(Path(folder), list(columns.values()), period, pressure / BAR)
     return Log(
         name=manifest.name,
         temperature=temperature,
         pressure=pressure,
         period=period,
-        drives=tuple(_drive(file, own) for file, own in columns.items()),
+        drives=tuple(
+            Drive(
+                file=path.name,
+                coil=drive["coil"],
+                U=drive["U_V"],
+                I=drive["I_A"],
+                **{name: drive[f"{name}_bar"] * BAR for name in ("p1", "p2", "p3", "target")},
+            )
+            for path, drive in columns.items()
+        ),
     )
 
 
-def _columns(folder: Path, file: str, period: float) -> dict[str, NDArray]:
+def _columns(path: Path, period: float) -> dict[str, NDArray]:
     """A drive's columns by name, each (samples,), in the unit of the name; U_V is the coil's voltage."""
-    path = folder / file
-    if Path(file).name != file:
-        raise CampaignError(f"{folder / FILE_NAME}: file {file!r} leaves the folder: copy it there")
-    try:
-        columns = read_named_columns(str(path), read_bytes(path), tuple(DECIMALS))
-    except OSError as error:
-        raise CampaignError(f"{path} cannot be read ({error.strerror}): add the file") from None
-    found = sampling_period(str(path), columns["time_s"])
-    if abs(found - period) > PERIOD_TOLERANCE * found:
+    columns = read_columns(str(path), content_of(path), tuple(DECIMALS))
+    printed = sampling_period(str(path), columns["time_s"])
+    if abs(printed - period) > PERIOD_TOLERANCE * printed:
         raise CampaignError(
-            f"{path}: rows follow each other in {found:g} s, but {FILE_NAME} states a control period of "
-            f"{period:g} s: correct control_period_s"
+            f"{path}: rows follow each other in {printed:g} s, but {FILE_NAME} states a control period "
+            f"of {period:g} s: correct control_period_s"
         )
     coil = columns["coil"]
     if not np.all(np.isin(coil, (0.0, 1.0))):
@@ -188,20 +190,11 @@ def _openings(coil: NDArray, p3: NDArray, period: float) -> Iterator[slice]:
     hold, changes = max(1, round(HOLD / period)), np.flatnonzero(np.diff(coil)) + 1
     for number, i in enumerate(changes):
         before = slice(max(i - hold, 0), i)
-        if coil[i] == 0.0 and i >= hold and np.all(coil[before]) and _rests(p3[before]):
+        if (
+            coil[i] == 0.0
+            and i >= hold
+            and np.all(coil[before])
+            and np.ptp(p3[before]) <= REST * np.max(np.abs(p3[before]))
+        ):
             end = changes[number + 1] if number + 1 < len(changes) else len(coil)
             yield slice(int(before.start), int(min(end, i + LONGEST / period)))
-
-
-def _rests(p3: NDArray) -> bool:
-    return bool(np.ptp(p3) <= REST * np.max(np.abs(p3)))
-
-
-def _drive(file: str, columns: Mapping[str, NDArray]) -> Drive:
-    return Drive(
-        file=file,
-        coil=columns["coil"],
-        U=columns["U_V"],
-        I=columns["I_A"],
-        **{name: columns[f"{name}_bar"] * BAR for name in ("p1", "p2", "p3", "target")},
-    )

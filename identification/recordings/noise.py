@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL
-from identification.readings_noise import noise_of_blocks, quantisation_step, rounding_error
+from identification.readings_noise import quantisation_step, rounding_error, white_noise
 from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, Campaign, Recording
 from identification.recordings.rules import RULES, RecordingRules
 
@@ -19,40 +19,23 @@ GRID_ERROR = 0.1
 COARSE_STEP = 2.0
 """Step over Table 3's noise above which a live channel may read the same throughout: a sensor
 that is somewhat quieter than Table 3's then rarely leaves a code."""
-NOISE_BLOCK = 0.02
-"""Length of the stretches of which each has its own estimate of the noise [s]: 40 samples."""
+
 SWITCHING_TRANSIENT = 0.02
 """Time after a switching that the noise estimate leaves out [s]: the coil and p3 move."""
 
 
 def noise_of(recordings: Sequence[Recording], channel: str) -> float:
-    """Standard deviation of a channel's readings about a smooth course [SI].
+    """Standard deviation of a channel's white noise about a smooth course, at least its rounding [SI].
 
-    Half the variance of first differences (Rice 1984), which a slope does not enter; the median over
-    blocks, which a few lively ones do not move, made the mean of a chi-square variable. A slow ripple
-    hardly enters: what neighbours share is no noise. Readings in coarse steps hardly differ between
-    neighbours, so their rounding error is the least.
+    Readings in coarse steps hardly differ between neighbours, and err all the same.
     """
-    estimates = [_block_variances(recording, channel) for recording in recordings]
-    variances = np.concatenate([part for part, _ in estimates])
-    length = min(length for _, length in estimates)
-    freedom = 2.0 * length / 3.0  # differences of white noise are correlated by -1/2
-    found = noise_of_blocks(variances, freedom)
-    return max(found, rounding_error(quantisation_step([r.channel(channel) for r in recordings])))
-
-
-def _block_variances(recording: Recording, channel: str) -> tuple[NDArray, int]:
-    """Variance of the noise in each quiet block, and the block's length [samples]."""
-    changes = np.diff(recording.channel(channel))
-    length = min(max(4, round(NOISE_BLOCK / recording.period)), len(changes))
-    transient = round(SWITCHING_TRANSIENT / recording.period)
-    lively = np.zeros(len(changes), dtype=bool)
-    for switching in np.flatnonzero(np.diff(recording.energised)):
-        lively[switching : switching + transient] = True
-    count = len(changes) // length
-    blocks = changes[: count * length].reshape(count, length)
-    quiet = ~np.any(lively[: count * length].reshape(count, length), axis=1)
-    return 0.5 * np.var(blocks[quiet if np.any(quiet) else slice(None)], axis=1), length
+    series: list[NDArray] = []
+    for recording in recordings:
+        transient = round(SWITCHING_TRANSIENT / recording.period)
+        switchings = np.flatnonzero(np.diff(recording.energised)) + 1
+        first, *later = np.split(recording.channel(channel), switchings)
+        series += [first, *(stretch[transient:] for stretch in later)]
+    return max(white_noise(series), rounding_error(quantisation_step(series)))
 
 
 def campaign_noise(campaign: Campaign) -> dict[str, float]:
@@ -71,9 +54,13 @@ def coarse_steps(pressures: Mapping[str, NDArray], sizes: Mapping[str, float]) -
     pressures: all readings of a campaign by name, each (samples,). sizes: the sensors' noise by name,
     in the same unit.
     """
-    own = {name: quantisation_step([readings]) for name, readings in pressures.items()}
-    coarsest = max(own.values(), default=0.0)
-    steps = {name: step or _shared(pressures[name], coarsest) for name, step in own.items()}
+    steps = {name: quantisation_step([readings]) for name, readings in pressures.items()}
+    coarsest = max(steps.values(), default=0.0)
+    for name, step in steps.items():
+        if coarsest and not step:
+            codes = np.unique(pressures[name]) / coarsest
+            off_grid = np.abs(codes - codes[0] - np.rint(codes - codes[0]))
+            steps[name] = coarsest if np.max(off_grid) < GRID_ERROR else 0.0
     return {name: step for name, step in steps.items() if step > COARSE_STEP * sizes[name]}
 
 
@@ -94,11 +81,8 @@ def campaign_steps(recordings: Sequence[Recording], rules: RecordingRules = RULE
     """`coarse_steps` of recordings by channel [Pa]; empty on a bench of fine steps."""
     if not recordings:
         return {}
-    pressures = {
-        name: np.concatenate([recording.channel(name) for recording in recordings]) for name in PRESSURES
-    }
-    noise = {name: rules.sensors[name].noise * UNITS[name][1] for name in PRESSURES}
-    return coarse_steps(pressures, noise)
+    pressures = {name: np.concatenate([r.channel(name) for r in recordings]) for name in PRESSURES}
+    return coarse_steps(pressures, {n: rules.sensors[n].noise * UNITS[n][1] for n in PRESSURES})
 
 
 def coarse_step_warnings(steps: Mapping[str, float]) -> list[str]:
@@ -111,10 +95,3 @@ def coarse_step_warnings(steps: Mapping[str, float]) -> list[str]:
         "step does not show, and a steady pressure cannot be told from a dead sensor; record with finer "
         "steps where you can"
     ]
-
-
-def _shared(readings: NDArray, coarsest: float) -> float:
-    """The others' step, if the few distinct readings (samples,) lie on its grid; otherwise 0.0."""
-    codes = np.unique(readings) / coarsest if coarsest else np.array([])
-    off_grid = np.abs(codes - codes[:1] - np.rint(codes - codes[:1]))
-    return coarsest if codes.size and np.max(off_grid) < GRID_ERROR else 0.0

@@ -5,7 +5,7 @@ sigma_S = -V2/(R T) dp2/dt. Where it is steady before and after an opening, and 
 be steady during the opening, too. An opening begins with the coil on and every chamber at rest.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import groupby
 
@@ -14,8 +14,8 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM
-from identification.recordings.log_files import Drive, Log
-from identification.recordings.recording import HOLD, Campaign, CampaignError, Recording
+from identification.recordings.log_files import LONGEST, Drive, Log
+from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
 REST_RANGE = 0.1 * BAR
 """Range of p3 within HOLD below which the control chamber is at rest [Pa]."""
@@ -25,9 +25,6 @@ SHUT_BEFORE, SHUT_AFTER = 0.1, 0.1
 
 VENTING = 0.03
 """Time after the command in which p3 is still too high for the valve to open [s]."""
-
-LONGEST = 0.6
-"""Longest opening [s]: a longer one tells less and takes longer to simulate."""
 
 SAME_FLOW, DEVIATIONS = 0.2 * GRAM, 3.0
 """Consumption is the same before and after an opening if it differs by less than this [kg/s] and this
@@ -41,6 +38,16 @@ OPENINGS_PER_DRIVE = 20
 
 HELD_OUT_EVERY = 3
 """Every third opening is held out."""
+
+PAUSE = 0.3
+"""Length of a stretch with the valve shut in which consumption is read off p2 [s]: to 0.02 g/s."""
+
+PAUSES_PER_DRIVE, LEAST_PAUSES = 4, 8
+"""Pauses of a drive that are compared, and without which nothing says that consumption rests."""
+
+REST_FLOW, APART = 0.02 * GRAM, 6.0
+"""Level of the lowest readings of consumption up to which nothing is consumed [kg/s], and how far
+apart these readings are, in standard deviations [1]."""
 
 LEAST_OPENINGS = 6
 """Openings without which a log says too little."""
@@ -90,10 +97,11 @@ def openings(log: Log, p: Mapping[str, float]) -> tuple[Campaign, set[str]]:
     storage = p["V2"] / (p["R_gas"] * log.temperature)
     recordings, steady = list[Recording](), set[str]()
     for drive in log.drives:
-        for stretch in _of_drive(drive, log.period, storage):
-            recordings.append(_recording(drive, stretch, log.period))
+        for stretch in _stretches(drive, log.period, storage):
+            recording = _recording(drive, stretch, log.period)
+            recordings.append(recording)
             if stretch.steady:
-                steady.add(recordings[-1].name)
+                steady.add(recording.name)
     campaign = Campaign(
         name=log.name,
         temperature=log.temperature,
@@ -110,18 +118,53 @@ def evenly(campaign: Campaign, preferred: Collection[str]) -> Campaign:
     """
     chosen: list[Recording] = []
     for _, group in groupby(campaign.recordings, key=lambda recording: drive_of(recording.name)):
-        own = list(group)
-        first = _spread([r for r in own if r.name in preferred], OPENINGS_PER_DRIVE)
-        others = [r for r in own if r.name not in preferred]
-        chosen += sorted(
-            [*first, *_spread(others, OPENINGS_PER_DRIVE - len(first))], key=lambda r: start_of(r.name)
-        )
+        drive = list(group)
+        first = _spread([r for r in drive if r.name in preferred], OPENINGS_PER_DRIVE)
+        others = [r for r in drive if r.name not in preferred]
+        first += _spread(others, OPENINGS_PER_DRIVE - len(first))
+        chosen += sorted(first, key=lambda recording: start_of(recording.name))
     roles = ("calibration",) * (HELD_OUT_EVERY - 1) + ("validation",)
     recordings = tuple(
         replace(recording, role=roles[number % HELD_OUT_EVERY])
         for number, recording in enumerate(chosen)
     )
     return _enough(replace(campaign, recordings=recordings))
+
+
+def pauses(log: Log, p: Mapping[str, float]) -> tuple[Recording, ...]:
+    """Stretches with the valve shut in which nothing is consumed, as recordings with sigma_S = 0.
+
+    Consumption is never negative: where p2 rises while the valve is shut, something leaks into it. The
+    lowest readings of a drive, as far as noise scatters them, are taken for no consumption unless their
+    level is above that. p: V2 and R_gas by symbol [SI].
+    """
+    storage, length = p["V2"] / (p["R_gas"] * log.temperature), round(PAUSE / log.period)
+    recordings = list[Recording]()
+    for drive in log.drives:
+        at_rest = _at_rest(drive, log.period)
+        ends = np.flatnonzero(np.diff(at_rest.astype(int), prepend=0, append=0)).reshape(-1, 2)
+        starts = [i for first, end in ends for i in range(first, end - length + 1, length)]
+        flows = [_flow(drive.p2[i : i + length], log.period, storage) for i in starts]
+        straight = [(f, i) for f, i in zip(flows, starts, strict=True) if f.scatter <= STRAIGHT]
+        low = min((f.value for f, _ in straight), default=0.0)
+        lowest = [(f.value, i) for f, i in straight if f.value <= low + APART * f.sd]
+        if len(lowest) < LEAST_PAUSES or np.median([value for value, _ in lowest]) > REST_FLOW:
+            continue
+        none = _Flow(0.0, 1.0, 1.0)
+        resting = [_recording(drive, _Stretch(i, i + length, none, none), log.period) for _, i in lowest]
+        recordings += _spread(resting, PAUSES_PER_DRIVE)
+    return tuple(recordings)
+
+
+def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
+    rows = slice(stretch.first, stretch.end)
+    return Recording(
+        name=f"{drive.file} at {stretch.first * period:.3f} s",
+        role="calibration",
+        period=period,
+        sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
+        **{name: getattr(drive, name)[rows] for name in CHANNELS},
+    )
 
 
 def _spread(recordings: Sequence[Recording], most: int) -> list[Recording]:
@@ -149,13 +192,15 @@ def start_of(recording: str) -> float:
     return float(recording.split(" ")[-2])
 
 
-def _of_drive(drive: Drive, period: float, storage: float) -> list[_Stretch]:
+def _stretches(drive: Drive, period: float, storage: float) -> Iterator[_Stretch]:
     """The openings of a drive; storage: V2/(R T) [kg/Pa]."""
     at_rest = _at_rest(drive, period)
     commands = np.flatnonzero(np.diff(drive.coil) < 0.0) + 1
-    starts = [int(i) for i in commands if at_rest[i - 1]]
-    found = [_stretch(drive, i, commands, at_rest, period, storage) for i in starts]
-    return [stretch for stretch in found if stretch is not None]
+    for i in commands:
+        if at_rest[i - 1]:
+            stretch = _stretch(drive, int(i), commands, at_rest, period, storage)
+            if stretch is not None:
+                yield stretch
 
 
 def _at_rest(drive: Drive, period: float) -> NDArray:
@@ -189,25 +234,9 @@ def _stretch(
 
 def _flow(p2: NDArray, period: float, storage: float) -> _Flow:
     """Air consumed while the valve is shut; p2: (samples,) [Pa], storage: V2/(R T) [kg/Pa]."""
-    time = np.arange(len(p2)) * period
-    centred = time - np.mean(time)
+    centred = (np.arange(len(p2)) - 0.5 * (len(p2) - 1)) * period
     spread = np.sum(centred**2)
     slope = float(centred @ p2 / spread)
     noise = float(np.sqrt(0.5 * np.var(np.diff(p2)))) + 1.0
     rest = float(np.std(p2 - slope * centred))
     return _Flow(-storage * slope, storage * noise / float(np.sqrt(spread)), rest / noise)
-
-
-def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
-    own = slice(stretch.first, stretch.end)
-    return Recording(
-        name=f"{drive.file} at {stretch.first * period:.3f} s",
-        role="calibration",
-        period=period,
-        U=drive.U[own],
-        I=drive.I[own],
-        p1=drive.p1[own],
-        p2=drive.p2[own],
-        p3=drive.p3[own],
-        sigma_S=np.full(stretch.end - stretch.first, stretch.flow),
-    )

@@ -245,7 +245,7 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
     level = float(np.median(U[start]))
     if switches(U) and not np.any(on):
         yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
-    if not on[0] and abs(level) > rules.sensors["U"].accuracy * rules.sensors["U"].high:
+    if not on[0] and abs(level) > rules.sensors["U"].margin:
         yield f"the voltage is {level:.4g} V, neither off nor on"
     settled = current[start]
     if on[0]:
@@ -262,16 +262,12 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
                 f"{level:.4g} V and a holding current of {held:.4g} A make {resistance:.4g} ohm, and "
                 f"coils have {least:g} to {greatest:g} ohm"
             )
-        settled = current[_time_off(on, period) > DECAY_TIME]
+        samples = np.arange(len(on))
+        off_since = samples - np.maximum.accumulate(np.where(on, samples, -1))
+        settled = current[off_since * period > DECAY_TIME]
     rest = float(np.median(settled)) if len(settled) else 0.0
     if abs(rest) > MOST_REST_CURRENT * rules.sensors["I"].high:
         yield f"a current of {rest:.4g} A flows while the coil is off"
-
-
-def _time_off(energised: NDArray, period: float) -> NDArray:
-    """Time since the coil was last on [s], (samples,)."""
-    index = np.arange(len(energised))
-    return (index - np.maximum.accumulate(np.where(energised, index, -1))) * period
 
 
 def _pressures(

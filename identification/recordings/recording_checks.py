@@ -55,7 +55,13 @@ def check_recording(
         # The supply may read the same in coarse steps, and any pressure of a steady record.
         may_rest = name in steps and (CHANNEL_OF[name] == "p1" or role == "quality")
         if name != "U_V" and not may_rest:  # a voltage may be fed back without noise
-            _check_alive(file, name, columns[name])
+            values = columns[name]
+            if np.min(values) == np.max(values):
+                raise CampaignError(
+                    f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise "
+                    "moves every live channel: check its sensor, or give simulated data the sensors' "
+                    "noise"
+                )
     if role != "quality" and not switches(columns["U_V"]):
         _check_length(file, len(columns["U_V"]), role, period)
         U = columns["U_V"]
@@ -69,7 +75,7 @@ def check_recording(
     for name, sensor in sensors.items():
         check_range(file, name, columns[name], sensor)
         # A vented chamber in coarse steps stays at the low end.
-        vented = name in steps and abs(ambient_bar - sensor.low) <= _margin(sensor)
+        vented = name in steps and abs(ambient_bar - sensor.low) <= sensor.margin
         _check_rail(file, name, columns[name], sensor, period, low_end=not vented)
     if role != "quality":
         _check_energised_start(file, columns["U_V"], period)
@@ -77,15 +83,6 @@ def check_recording(
             if name != "U_V":
                 _check_steady_start(file, name, columns[name], sensor, period)
     return period
-
-
-def _check_alive(file: str, name: str, values: NDArray) -> None:
-    """Noise and the ADC's steps move every channel that is connected; a dead one tells nothing."""
-    if np.min(values) == np.max(values):
-        raise CampaignError(
-            f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise moves "
-            "every live channel: check its sensor, or give simulated data the sensors' noise"
-        )
 
 
 def _check_length(file: str, samples: int, role: str, period: float) -> None:
@@ -100,14 +97,14 @@ def _check_length(file: str, samples: int, role: str, period: float) -> None:
 
 def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
     """Values (samples,) lie in Table 1's range, but for the accuracy."""
-    margin = _margin(sensor) + 1e-9
+    margin = sensor.margin + 1e-9
     outside = (values < sensor.low - margin) | (values > sensor.high + margin)
     if np.any(outside):
         sample = int(np.argmax(outside))
         raise CampaignError(
             f"{file}, line {line_number(sample)}: {name} is {values[sample]:g}, outside the sensor's "
             f"range [{sensor.low:g}, {sensor.high:g}] by more than its accuracy of "
-            f"{_margin(sensor):g}: check unit and scaling, or cut the recording there"
+            f"{sensor.margin:g}: check unit and scaling, or cut the recording there"
         )
 
 
@@ -116,7 +113,7 @@ def _check_rail(
 ) -> None:
     """No reading stays at an end of the range, or where the ADC saturates."""
     at_end = (low_end & (values <= sensor.low)) | (values >= sensor.high - sensor.resolution)
-    first, length = _longest_run(at_end[1:] & (values[1:] == values[:-1]))
+    first, length = longest_run(at_end[1:] & (values[1:] == values[:-1]))
     if length >= max(_samples(STUCK_TIME, period), STUCK_SAMPLES):
         raise CampaignError(
             f"{file}, {_lines(first, length + 1)}: {name} is stuck at {values[first]:g}, an end of the "
@@ -141,17 +138,12 @@ def _check_steady_start(file: str, name: str, values: NDArray, sensor: Sensor, p
     start = values[: _samples(HOLD, period)]
     quarter = len(start) // 4
     change = float(np.mean(start[-quarter:]) - np.mean(start[:quarter]))
-    if abs(change) > _margin(sensor):
+    if abs(change) > sensor.margin:
         raise CampaignError(
             f"{file}, {_lines(0, len(start))}: {name} changes by {change:g} in the first "
             f"{1e3 * HOLD:g} ms, which must be steady: let the bench settle, energised, before "
             "recording"
         )
-
-
-def _margin(sensor: Sensor) -> float:
-    """Accuracy in the sensor's unit."""
-    return sensor.accuracy * sensor.high
 
 
 def _samples(duration: float, period: float) -> int:
@@ -163,7 +155,7 @@ def _lines(first: int, count: int) -> str:
     return f"lines {line_number(first)} to {line_number(first + count - 1)}"
 
 
-def _longest_run(mask: NDArray) -> tuple[int, int]:
+def longest_run(mask: NDArray) -> tuple[int, int]:
     """First index and length of the longest run of true in a boolean array (samples,)."""
     edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
     lengths = edges[1::2] - edges[::2]

@@ -32,7 +32,7 @@ class RecordingRules:
     @property
     def pressure_margin(self) -> float:
         """Accuracy of the pressure sensors, of the worst of them [bar]."""
-        return max(self.sensors[name].accuracy * self.sensors[name].high for name in ("p1", "p2", "p3"))
+        return max(self.sensors[name].margin for name in ("p1", "p2", "p3"))
 
 
 RULES = RecordingRules()

@@ -52,13 +52,18 @@ class ModelInputs:
 def model_inputs(recording: Recording, p: Mapping[str, float]) -> ModelInputs:
     """The inputs that the model is given for a recording; p: volumes and temperature by symbol [SI]."""
     start = slice(0, max(2, round(HOLD / recording.period)))
+    # The valve is shut: what is consumed from the first sample on lacks in p2.
+    consumed = (
+        np.cumsum(recording.sigma_S[start] * recording.period) - recording.sigma_S[0] * recording.period
+    )
+    lacking = consumed * p["R_gas"] * p["T_env"] / p["V2"]
     return ModelInputs(
         period=recording.period,
         U=smooth_voltage(recording),
         p1=smooth_supply(recording, p),
         sigma_S=recording.sigma_S,
         U_start=float(np.mean(recording.U[start])),
-        p2_start=float(np.mean(recording.p2[start])),
+        p2_start=float(np.mean(recording.p2[start] + lacking)),
     )
 
 

@@ -85,7 +85,10 @@ def next_recording(
     answers = [hypothesis.estimate for hypothesis in (*ranking.hypotheses, ranking.recalibrated)]
     pairs = zip((*ranking.probabilities, ranking.no_cause), answers, strict=True)
     (probability, first), (_, second) = sorted(pairs, key=lambda pair: -pair[0])[:2]
-    one, other = (" + ".join(answer.hypothesis.titles) or "no cause" for answer in (first, second))
+    one, other = (
+        " + ".join(cause.title for cause in answer.hypothesis.causes) or "no cause"
+        for answer in (first, second)
+    )
     if probability > CERTAIN and verdict in (KNOWN, NO_GAP):
         sure = f"{one}: {probability_text(probability)}"
         return NextRecording(text=f"No further recording is needed ({sure}).")

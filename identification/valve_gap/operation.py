@@ -1,4 +1,4 @@
-"""Operation logs for the diagnosis: openings at steady consumption, and the drive where a cause begins.
+"""Operation logs for the diagnosis: openings at steady consumption, and the drives with each cause.
 
 A log does not hold the consumption: each opening has a nuisance for the error of its estimate.
 """
@@ -12,7 +12,6 @@ from time import perf_counter
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import softmax
 
 from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal
@@ -20,17 +19,28 @@ from epv_env.plant.plantfile import Plant, load_plant
 from identification.gap.diagnosis import Diagnosis, diagnose, recalibrated_by_seen_noise
 from identification.gap.fit.fitting_problem import FitCache
 from identification.gap.fit.gauss_newton import linearise
-from identification.gap.judge.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
+from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.judge.verdict import AMBIGUOUS, UNKNOWN
 from identification.gap.plant import NuisanceParameter
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
 from identification.gap.report.gap_json import write_results
-from identification.gap.search.onset import least_squares_by_onset
-from identification.gap.search.posterior import log_likelihoods
-from identification.gap.search.screening import simulate_signatures
+from identification.gap.search.onset import Span, in_span, spans_of_causes
+from identification.gap.search.screening import (
+    CauseSignature,
+    assess_separability,
+    simulate_signatures,
+)
 from identification.recordings.log_files import Log, read_log
-from identification.recordings.openings import drive_of, evenly, openings, start_of
-from identification.recordings.recording import OUTPUTS, Campaign, campaign_facts
+from identification.recordings.openings import (
+    HELD_OUT_EVERY,
+    drive_of,
+    evenly,
+    openings,
+    pauses,
+    start_of,
+)
+from identification.recordings.recording import OUTPUTS, Campaign, Recording, campaign_facts
 from identification.recordings.rules import rules_of
 from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
 from identification.valve_gap.diagnose import (
@@ -49,6 +59,9 @@ CONSUMPTION = (
 )
 """Error of a consumption that was read off p2, and its change during an opening [kg/s]."""
 
+RESTING = 1.0 / 30.0
+"""Error of the consumption where nothing is consumed, relative to CONSUMPTION [1]: 0.01 g/s."""
+
 CHANGED_CONSUMPTION = 1.5
 """Misfit of p2 relative to that of the better openings of a drive (their lower quartile) beyond which
 consumption jumped in an opening [1]. A cause acts in every opening of a drive, a consumer in a few."""
@@ -66,7 +79,7 @@ def diagnose_log(
 ) -> Diagnosis:
     """Diagnose an operation log; write gap.json, and unless `report` is False report and plant file.
 
-    A cause may act from a later drive on: the search is done for each first drive.
+    Each cause acts in its most probable drives: from a later one on, or until it is mended.
 
     plant: plant file with the nominal parameters, None for the report's calibration. without: causes to
     leave out. more: makes further sections of the report. Finished fits are kept in `out` and taken up
@@ -77,11 +90,12 @@ def diagnose_log(
     described = load_plant(plant)
     log = read_log(folder, rules_of(described))
     campaign, steady = steady_openings(log, described)
-    valve = LoggedValve(campaign, described, steady, without)
+    resting = pauses(log, described.parameters)
+    valve = LoggedValve(with_pauses(campaign, resting, log), described, steady, without, resting)
     journal = Journal(out / JOURNAL, subject(valve, without, {}))
     steps = steps_on_stderr(began) if report else lambda step: None
     cache = FitCache(valve, journal, steps)
-    found = _from_its_drive(valve, seed, cache)
+    found = _in_its_drives(valve, seed, cache)
     found = replace(found, warnings=[*valve.warnings, *found.warnings])
     if report:
         step = next_step(found.conclusion.verdict, folder, out, Path(plant) if plant else None)
@@ -102,35 +116,43 @@ def next_step(verdict: str, folder: Path, out: Path, plant: Path | None) -> Next
     return after_diagnosis(verdict, folder, out, plant)
 
 
-def _from_its_drive(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosis:
-    """The diagnosis with the causes acting from the most probable drive on."""
-    chances = onset_probabilities(valve, cache)
-    onset = int(np.argmax(chances))
-    found = diagnose(valve.since(onset), seed=seed, cache=cache)
-    if onset == 0 or found.conclusion.verdict == NO_GAP:
-        return found
-    return replace(found, onset=(valve.drives[onset], float(chances[onset])))
-
-
-def onset_probabilities(valve: "LoggedValve", cache: FitCache) -> NDArray:
-    """Probability of each first drive, (drives,), by the misfit that the best single cause leaves.
-
-    That it acts from the first drive on is as probable before the data as all later drives together.
-    """
+def _in_its_drives(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosis:
+    """The diagnosis with each cause acting in its most probable drives."""
     problem, base = recalibrated_by_seen_noise(prepared(valve), cache)
     runs = linearise(problem, [base], problem.fitted_runs)[0]
     signatures = simulate_signatures(problem, base, problem.plant.causes)
-    names = [drive_of(problem.plant.runs[r].name) for r in problem.fitted_runs]
-    drives = np.array([valve.drives.index(name) for name in names])
-    squares = least_squares_by_onset(runs, signatures, drives)
-    misfits = (squares / np.min(squares) - 1.0) * problem.readings / 2.0
-    scores = log_likelihoods(misfits, problem.readings)
-    scores[1:] -= np.log(max(len(squares) - 1, 1))
-    return softmax(scores)
+    drives = [drive_of(problem.plant.runs[r].name) for r in problem.fitted_runs]
+    numbers = np.array([valve.drives.index(drive) for drive in drives])
+    spans = spans_of_causes(
+        runs, signatures, numbers, len(valve.drives), problem.readings, valve.lasting
+    )
+    found = diagnose(valve.acting_in(spans), seed=seed, cache=cache)
+    onsets = {label: span.onset(valve.drives) for label, span in spans.items()}
+    hidden = set(found.ranking.separability.absorbed)
+    return replace(
+        found,
+        onsets={label: onset for label, onset in onsets.items() if onset},
+        as_consumption=tuple(c for c in as_consumption(runs, signatures) if c in hidden),
+    )
+
+
+def as_consumption(
+    runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
+) -> tuple[str, ...]:
+    """Labels of causes that would show if consumption were known, and that the unknown one absorbs.
+
+    runs: the model without a cause, linearised. signatures: of the causes beside it.
+    """
+    of_consumption = slice(-len(CONSUMPTION), None)  # offsets are the last nuisances of a run
+    known = [replace(run, run_slopes=run.run_slopes.copy()) for run in runs]
+    for run in known:
+        run.run_slopes[:, of_consumption] = 0.0
+    absorbed, still = (assess_separability(each, signatures).absorbed for each in (runs, known))
+    return tuple(label for label in absorbed if label not in still)
 
 
 class LoggedValve(Valve):
-    """`GreyBox` for an operation log: causes act from a drive on, parameters from the first one."""
+    """`GreyBox` for an operation log: each cause acts in its drives, parameters in all."""
 
     def __init__(
         self,
@@ -138,44 +160,63 @@ class LoggedValve(Valve):
         plant: Plant,
         steady: Collection[str],
         without: Sequence[str] = (),
+        resting: Sequence[Recording] = (),
     ):
-        """campaign, steady: of `steady_openings`. See `Valve`."""
+        """campaign, steady: of `steady_openings`. resting: recordings of `pauses`. See `Valve`."""
         super().__init__(campaign, plant, without=without, offsets=CONSUMPTION)
+        known = {recording.name for recording in resting}
+        self.doubt = np.array([RESTING if run.name in known else 1.0 for run in self.runs])
+        """Error of the consumption in each run, relative to CONSUMPTION, (runs,) [1]."""
         for run in self.runs:
             p2 = run.trusted[OUTPUTS.index("p2")]
             # The controller opens the valve because this reading is low, by noise as often as not.
             p2[np.flatnonzero(np.diff(run.inputs["U"]) < 0.0) + 1] = False
-            if run.name not in steady:  # p2 then follows from a consumption that nobody knows
+            if run.name not in known.union(
+                steady
+            ):  # p2 then follows from a consumption that nobody knows
                 p2[:] = False
         self.screened = tuple(_in_drive(finding, campaign) for finding in self.screened)
         self.drives = list(dict.fromkeys(drive_of(r.name) for r in campaign.recordings))
-        self.acting = np.ones(len(self.recordings), dtype=bool)
         kept = {p.symbol for p in self.parameters} | {t.symbol for t in self.tolerances}
-        self.late = {p.symbol for cause in self.causes for p in cause.parameters} - kept
+        self.lasting = {
+            cause.label
+            for cause in self.causes
+            if cause.run_parameters or kept & {p.symbol for p in cause.parameters}
+        }
+        """Labels of causes that act in all drives: parameters off their values, and causes whose state
+        at the start of each opening is fitted, for which a linear prediction does not hold."""
+        self.acting: dict[str, NDArray] = {}
+        """In which runs a cause acts that does not act in all, boolean (runs,), by symbol."""
 
-    def since(self, onset: int) -> "LoggedValve":
-        """The same with causes that act from drive number `onset` on, counted from 0."""
-        late = copy(self)
-        late.acting = np.array([self.drives.index(drive_of(r.name)) >= onset for r in self.recordings])
-        return late
+    def acting_in(self, spans: Mapping[str, Span]) -> "LoggedValve":
+        """The same with causes, by label, that act in some drives only."""
+        other = copy(self)
+        drives = np.array([self.drives.index(drive_of(r.name)) for r in self.recordings])
+        other.acting = {
+            p.symbol: in_span(drives, spans[cause.label].first, spans[cause.label].end)
+            for cause in self.causes
+            for p in cause.parameters
+            if not spans[cause.label].whole
+        }
+        return other
 
     def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
         """`GreyBox.outputs`: per run an array (3, samples, n) of OUTPUTS [Pa, Pa, A]."""
-        return super().outputs(self._since_onset(values), runs)
+        return super().outputs(self._where_acting(values), runs)
 
     def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
-        return super()._one(self._since_onset(values), run)
+        return super()._one(self._where_acting(values), run)
 
-    def _since_onset(self, values: Mapping[str, NDArray]) -> dict[str, NDArray]:
-        """Values by symbol with those of causes (n, runs), nominal in drives before the onset."""
-        if np.all(self.acting):
-            return dict(values)
-        return {
-            s: np.where(self.acting, v[:, None] if np.ndim(v) == 1 else v, self.base[s])
-            if s in self.late
-            else v
-            for s, v in values.items()
-        }
+    def _where_acting(self, values: Mapping[str, NDArray]) -> dict[str, NDArray]:
+        """Values by symbol, those of causes nominal in drives without them, consumption as doubted."""
+        found = dict(values)
+        for symbol, value in values.items():
+            by_run = value[:, None] if np.ndim(value) == 1 else value
+            if symbol in self.acting:
+                found[symbol] = np.where(self.acting[symbol], by_run, self.base[symbol])
+            elif symbol in (FLOW_SHIFT, FLOW_RAMP):
+                found[symbol] = by_run * self.doubt
+        return found
 
 
 def _in_drive(finding: Finding, campaign: Campaign) -> Finding:
@@ -199,6 +240,15 @@ def steady_openings(log: Log, plant: Plant) -> tuple[Campaign, set[str]]:
         usual = np.quantile([misfits[name] for name in own] or [0.0], 0.25)
         steady -= {name for name in own if misfits[name] > CHANGED_CONSUMPTION * usual}
     return evenly(campaign, steady), steady
+
+
+def with_pauses(campaign: Campaign, resting: Sequence[Recording], log: Log) -> Campaign:
+    """The campaign of a log with recordings of `pauses`, every third held out, drives in order."""
+    roles = ("calibration",) * (HELD_OUT_EVERY - 1) + ("validation",)
+    more = [replace(r, role=roles[number % HELD_OUT_EVERY]) for number, r in enumerate(resting)]
+    place = {drive.file: number for number, drive in enumerate(log.drives)}
+    every = sorted([*campaign.recordings, *more], key=lambda r: place[drive_of(r.name)])
+    return replace(campaign, recordings=tuple(every))
 
 
 def _misfits(valve: Valve) -> NDArray:

@@ -90,6 +90,20 @@ def test_a_second_process_is_refused(package, tmp_path, capsys):
     assert "another process writes into" in capsys.readouterr().err
 
 
+def test_what_a_killed_writer_left_goes_with_the_next_one(tmp_path):
+    """A kill between writing and renaming leaves the new content under a hidden name."""
+    for name in (
+        ".report.json.0123abcd",
+        ".export.0123abcd/.epv_policy.c.0123abcd",
+        "kept.0123abcd",
+        ".hidden",
+    ):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).touch()
+    with only_writer(tmp_path):
+        assert {path.name for path in tmp_path.iterdir()} == {"kept.0123abcd", ".hidden", ".lock"}
+
+
 def test_a_missing_package_is_named_with_its_extra(package, tmp_path, capsys):
     (tmp_path / package / "needs.py").write_text(
         f'"""Need torch."""\nraise ModuleNotFoundError("none", name="torch")\n{GREET}'

@@ -49,11 +49,10 @@ def test_shields_act_outside_the_band_only():
     full = {"on": 1.0, "head": 1.0, "p1": 9.0, "p3": 8.5}
     assert above_band(0.5)
     assert not above_band(np.nextafter(0.5, 0))
-    low = seen(p2_error=-0.5)[0]
-    assert below_band(valve(**full), low)
-    assert not below_band(valve(**full), seen(p2_error=-0.49)[0])
+    assert below_band(valve(**full), -0.5)
+    assert not below_band(valve(**full), -0.49)
     for change in ({"on": 0.0}, {"head": 0.9}, {"p3": 8.4}):  # a pulse, a low supply, one under way
-        assert not below_band(valve(**full | change), low)
+        assert not below_band(valve(**full | change), -0.5)
 
 
 class Off:

@@ -16,7 +16,9 @@ from controllers.monitor import (
     CONDITIONS,
     FEATURES,
     LINEAR,
+    RETURN,
     RISE,
+    SHIPPED,
     TERMS,
     Monitor,
     MonitorModel,
@@ -24,9 +26,9 @@ from controllers.monitor import (
 )
 from epv_env.common.files import JSONFileError
 from epv_env.plant.plantfile import Plant
-from identification.recordings.log_files import read_log
+from identification.recordings.log_files import Log, read_log
 from tests.training.exports import sanitisers
-from training.commands.monitor import follow, sentence
+from training.commands.monitor import agreement, follow, sentences
 from training.deploy.compiled import build
 from training.deploy.monitor_c import effects_of, sources
 from training.drives import drives, write_log
@@ -73,18 +75,21 @@ def test_false_alarms_are_at_most_as_frequent_as_stated() -> None:
     assert alarms <= rate * hours + 3 * np.sqrt(rate * hours)
 
 
-def test_a_known_shift_is_found_dated_and_named() -> None:
-    rng, monitor = np.random.default_rng(1), Monitor(white_model())
-    for k in range(80):
-        shift = 2.0 * np.eye(N)[1] if k >= 50 else 0.0
-        observe(monitor, rng.standard_normal(N) + shift)
-        assert k >= 50 or not monitor.alarm
-    assert monitor.alarm
-    assert next(iter(monitor.causes())) == "second"
-    assert next(iter(monitor.components())) == "flow"
-    assert monitor.onset == pytest.approx(
-        50 * PERIODS * monitor.period, abs=3 * PERIODS * monitor.period
-    )
+def test_changes_and_a_return_are_found_dated_and_named() -> None:
+    """Nothing, the second effect, the first one beside it, and that one gone again."""
+    rng, monitor, size = np.random.default_rng(1), Monitor(white_model()), 2.0 * np.eye(N)
+    states = [0.0 * size[0], size[1], size[0] + size[1], size[1]]
+    for part, state in enumerate(states):
+        for _ in range(50):
+            observe(monitor, rng.standard_normal(N) + state)
+        assert len(monitor.changes) == part
+    assert not monitor.alarm
+    named = [next(iter(change.causes)) for change in monitor.changes[:3]]
+    assert named == ["second", "first", RETURN]
+    assert next(iter(monitor.changes[0].components)) == "flow"
+    seconds = PERIODS * monitor.period
+    for part, change in enumerate(monitor.changes, start=1):
+        assert change.onset == pytest.approx(50 * part * seconds, abs=3 * seconds)
 
 
 def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
@@ -150,7 +155,7 @@ def test_an_opening_with_a_missing_reading_does_not_count(channel, value) -> Non
 def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     plant = Plant.calibrated()
     controller = Hysteresis(open_below=-0.3, shut_above=0.0)
-    drive = drives(plant, controller, [3], {}, duration=10.0)[0]
+    drive = drives(plant, controller, [3], {}, duration=40.0)[0]
     drive[:, 1] *= drive[:, 0]  # as logs have it: no voltage while the coil is off
     drive[700::131, 5], drive[757::173, 4] = 1e300, 1.7e308
     drive[800:900, 1:], drive[1000::191, 2] = 0.0, np.nan
@@ -161,14 +166,15 @@ def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     code = ctypes.CDLL(str(built))
     code.epv_monitor_probability.restype = code.epv_monitor_causes.restype = ctypes.c_double
     memory = ctypes.create_string_buffer(2**20)
-    code.epv_monitor_reset(memory)
+    code.epv_monitor_reset(memory, ctypes.c_double(0.01))
     for coil, *readings in drive.tolist():
         monitor.update(coil, *readings)
         code.epv_monitor_update(memory, int(coil), *map(ctypes.c_double, readings))
     assert monitor.history
-    found = code.epv_monitor_probability(memory, ctypes.c_double(0.01))
+    assert monitor.settled  # white features are not those of the plant: changes, and what follows
+    found = code.epv_monitor_probability(memory)
     assert found == pytest.approx(monitor.probability, rel=1e-9)
-    shares = (ctypes.c_double * 3)()
+    shares = (ctypes.c_double * 4)()
     assert code.epv_monitor_causes(memory, shares) == pytest.approx(monitor.onset, rel=1e-9)
     named = dict(zip(effects_of(model), shares, strict=True))
     assert named == pytest.approx(monitor.causes(), rel=1e-9)
@@ -191,11 +197,11 @@ def test_a_reading_of_any_size_leaves_the_monitor_able_to_find_a_change(column, 
     assert len(monitor.history) > 0
     assert np.isfinite(monitor.log_odds)
     assert monitor.restarts == 0
-    before = monitor.causes()
-    for _ in range(40):
-        observe(monitor, monitor._mean + 2.0 * np.eye(N)[1])
-    assert monitor.alarm
-    assert monitor.causes()["second"] > before["second"]
+    present = monitor._mean + monitor._reference[:, 0]
+    for shift in (0.0, 2.0 * np.eye(N)[1]):
+        for _ in range(40):
+            observe(monitor, present + shift)
+    assert next(iter(monitor.changes[-1].causes)) == "second"
 
 
 def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
@@ -204,7 +210,36 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     observe(monitor, np.zeros(N))
     assert monitor.restarts == 1
     assert np.isfinite(monitor.log_odds)
-    assert "Restarts because its state was not finite: 1." in sentence(monitor)
+    log = Log(name="", temperature=293.0, pressure=1e5, period=5e-3, drives=())
+    assert "Restarts because its state was not finite: 1." in sentences(monitor, log, [])
+
+
+def test_a_diagnosis_that_differs_is_explained() -> None:
+    content = {"verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None}
+    monitor = Monitor(white_model())
+    assert "agrees: no_gap" in agreement(monitor, content)
+    monitor._log[1] = 50.0
+    assert "second (no_gap): the valve differs from the start on" in agreement(monitor, content)
+    monitor._since[1] = 60.0
+    assert "second (no_gap): this effect is absorbed" in agreement(monitor, content)
+    content["ambiguity_set"] = [["second"], ["third"]]
+    assert "agrees" in agreement(monitor, content)
+    content["ambiguity_set"] = [["third"]]
+    assert "names third: it simulates every effect" in agreement(monitor, content)
+    assert "hardly shows" in agreement(Monitor(white_model()), content)
+
+
+def test_what_is_shipped_finds_a_change_and_its_return() -> None:
+    plant, model = Plant.calibrated(), MonitorModel.load(SHIPPED)
+    eddy = plant.parameters.replace(G_eddy=0.004)
+    monitor = Monitor(model)
+    for part, p in enumerate([plant.parameters, eddy, plant.parameters]):
+        chosen = {"parameters": [p] * 2}
+        for drive in drives(plant, Hysteresis(open_below=-0.3, shut_above=0.0), [part, 9], chosen):
+            monitor.follow(drive)
+        assert len(monitor.changes) == part
+    assert [next(iter(c.causes)) for c in monitor.changes] == ["eddy_current", RETURN]
+    assert [c.onset for c in monitor.changes] == pytest.approx([60.0, 120.0], abs=6.0)
 
 
 HOSTILE = """
@@ -220,7 +255,7 @@ int main(void)
     const double odd[] = {0, -1, 1e300, -1e300, DBL_MAX, -DBL_MAX, 5e-324, 1e154, NAN, INFINITY};
     double share[EPV_EFFECTS];
     unsigned k;
-    epv_monitor_reset(&m);
+    epv_monitor_reset(&m, 0.01);
     m.periods = 4294967290.0; /* 248 days */
     m.last = m.periods * 5e-3;
     m.on = INT_MAX;
@@ -233,7 +268,7 @@ int main(void)
         if (k == 200000)
             m.log[1] = NAN, m.off = INT_MAX;
         epv_monitor_update(&m, k % 999 ? on : INT_MIN, v[0], v[1], v[2], v[3], v[4]);
-        if (k % 100 == 0 && k < 200000 && !isfinite(epv_monitor_probability(&m, 0.01)))
+        if (k % 100 == 0 && k < 200000 && !isfinite(epv_monitor_probability(&m)))
             return 1;
     }
     epv_monitor_causes(&m, share);
@@ -256,7 +291,7 @@ def test_no_name_reaches_the_c_code() -> None:
     model = replace(white_model(), effects=("zebra", "yak"), components=("xenon", "walrus"))
     texts = "".join(sources(model).values())
     assert not any(name in texts for name in (*model.effects, *model.components))
-    assert effects_of(model) == ["zebra", "yak", "unknown"]
+    assert effects_of(model) == ["zebra", "yak", "unknown", "return"]
 
 
 @pytest.mark.parametrize(

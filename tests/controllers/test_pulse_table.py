@@ -34,9 +34,17 @@ def cases():
     return p1, p2, p3
 
 
+def gained(table, t, offset, p1, p2, p3, stay, slope):
+    """Change of p2 until the valve has shut, if the coil stays off for `stay` [s] [bar]."""
+    age = lookup.venting_age(table, t, offset, p1, p2, p3)
+    node, share = lookup.place(STAY, stay + min(age, 0.0))
+    at = (table, t, lookup.cell_of(p1, p2, age), age, slope)
+    return lookup.change(*at, node) * (1 - share) + lookup.change(*at, node + 1) * share
+
+
 def each(name, table, *arguments):
-    """A compiled lookup of the table's one plant, for many valves: numbers or arrays (n,)."""
-    function = getattr(lookup, name)
+    """A lookup of the table's one plant, for many valves: numbers or arrays (n,)."""
+    function = gained if name == "gained" else getattr(lookup, name)
     return np.array([function(table, 0, 0.0, *numbers) for numbers in np.broadcast(*arguments)])
 
 

@@ -14,6 +14,7 @@ import controllers
 import epv_env  # noqa: F401 - registers the environments
 from controllers.knowledge import WithRules
 from controllers.policy import Policy, load_policy
+from controllers.pulse import _Pulse
 from controllers.registration import Choice, RegistrationError
 from controllers.registry import REGISTRY, TUNED_KINDS, registration
 from controllers.tuned import (
@@ -29,6 +30,7 @@ from epv_env.plant.plantfile import Plant
 
 UNREGISTERED = {
     Policy: "training writes it into folders, each of which names itself",
+    _Pulse: "what the two pulse controllers share",
     WithRules: "worn around a controller, which has a record of its own",
 }
 """Controllers that the registry does not list, each with the reason."""

@@ -5,15 +5,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from controllers.policy import load_policy
-from controllers.sensor_check import HELD, SENSES, checked, overruled
+from controllers.hysteresis import Hysteresis
+from controllers.sensor_check import HELD, SENSES, checked, ends_of, overruled
 from controllers.tuned import tuned
 from epv_env.observation import LAYOUT, decode, encode
 from epv_env.plant.channels import SENSORS
+from epv_env.plant.plantfile import Plant
 
 PERIOD = 5e-3
-PARTS = load_policy().constants
-NEVER, ALWAYS = (PARTS.fallback._replace(open_below=end, shut_above=end) for end in (-np.inf, np.inf))
+ENDS = ends_of(Plant.calibrated().sensors)
+USUAL = Hysteresis(open_below=-0.1, shut_above=0.0).constants
+NEVER, ALWAYS = (USUAL._replace(open_below=end, shut_above=end) for end in (-np.inf, np.inf))
 """Fall-backs that keep the coil on, and off."""
 LOST = [np.nan, np.inf, -np.inf, 0.0, 0.7, 16.3, 1e308]
 CHANNELS = ["p1", "p2", "p3", "I", "target"]
@@ -29,7 +31,7 @@ class Check:
 
     def act(self, observation) -> float:
         self.shown = observation.copy()
-        checked(self.senses, self.shown, PARTS.ends, self.fallback, PERIOD)
+        checked(self.senses, self.shown, ENDS, self.fallback, PERIOD)
         return overruled(self.senses, 0.0)
 
 

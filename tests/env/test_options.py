@@ -16,7 +16,7 @@ CENTRE = Parameters.calibrated()
 RECORDED = Supply.recorded(np.array([0.0, 0.1, 0.3]), np.array([9.0, 9.5, 8.0]))
 MIXTURE = Mixture(
     alternatives=tuple(
-        Alternative(name=str(sizes), probability=0.5, region=Region.from_choices(sizes, CENTRE))
+        Alternative(name=str(sizes), probability=0.5, region=Region(centre=CENTRE).changed(sizes))
         for sizes in ({"t_delay": (0.002, 0.01)}, {"G_eddy": 0.004, "R": (40.0, 41.0)})
     )
 )

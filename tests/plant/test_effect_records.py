@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import epv_env.plant
-from epv_env.plant.effects.law import SLOTS
+from epv_env.plant.effects.law import SLOTS, Terms
 from epv_env.plant.effects.record import Constant, Effect, EffectError, Size
 from epv_env.plant.effects.registry import CONSTANTS, EFFECTS, LAWFUL, effect
 from epv_env.plant.parameters import Parameters, table
@@ -28,17 +28,18 @@ def source(folder: Path, pattern: str = "*.py") -> str:
 
 
 def unread_constants(constants: tuple[Constant, ...]) -> list[str]:
-    """Constants that no compiled function reads; `with_laws` reads an effect's own two by its name."""
+    """Constants that no compiled function reads; `with_laws` reads those of laws by their names."""
     text = source(PLANT) + re.sub(r"name=\S+", "", source(PLANT / "effects"))
-    text += " ".join(f".law{slot}_on_{name}" for slot in SLOTS for name in LAWFUL.values())
-    read = [row.name for row in constants if row.in_equations]
-    return [name for name in read if not re.search(rf"\.{name}\b", text)]
+    read_by_name = [*Terms._fields, *(f"on_{name}" for name in LAWFUL.values())]
+    text += " ".join(f".law{slot}_{name}" for slot in SLOTS for name in read_by_name)
+    text += ".coil_start"  # it sets the state at the start
+    return [row.name for row in constants if not re.search(rf"\.{row.name}\b", text)]
 
 
 def unused_symbols(record: Effect) -> list[str]:
     """Sizes of an effect without constants of its own that nothing outside of its record uses."""
     text = source(PLANT)
-    return [s for s in record.symbols if not record.constants and f'"{s}"' not in text]
+    return [s for s in record.symbols if not record.rows and f'"{s}"' not in text]
 
 
 def test_every_size_is_a_parameter_that_is_off_at_zero():
@@ -57,7 +58,7 @@ def test_the_equations_use_every_effect():
 
 
 def test_an_effect_that_the_equations_forget_is_found():
-    row = Constant(name="new_force", meaning="a new force [N]", value=lambda p: p["k_new"])
+    row = Constant("new_force", lambda p: p["k_new"])
     assert unread_constants((row,)) == ["new_force"]
     assert unused_symbols(COMPLETE) == ["k_new"]
 

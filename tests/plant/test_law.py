@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from epv_env.plant.channels import readings
-from epv_env.plant.effects.law import ARGUMENTS, KNOTS, Law, growth_1, growth_2, laws_of, placed
+from epv_env.plant.effects.law import ARGUMENTS, KNOTS, SLOTS, Law, Terms, growth, laws_of, placed
 from epv_env.plant.effects.registry import PLACES, Effects, effect, effect_constants, with_laws
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters
@@ -46,15 +46,16 @@ def openings(p: Any) -> np.ndarray:
     return np.array([readings(run.state, p)[name] for name in ("p2", "p3", "I")])
 
 
-@pytest.mark.parametrize(("slot", "growth"), [(1, growth_1), (2, growth_2)])
+@pytest.mark.parametrize("slot", SLOTS)
 @pytest.mark.parametrize("argument", ARGUMENTS)
-def test_growth_is_linear_between_its_knots_and_constant_beyond(argument, slot, growth):
+def test_growth_is_linear_between_its_knots_and_constant_beyond(argument, slot):
     (low, high), weights = ENDS[ARGUMENTS[argument][0]], ARGUMENTS[argument][1]
     e = Effects(*effect_constants({**CALIBRATED, **law("seat_leak", argument, slot=slot)})[:, 0])
     at = np.linspace(low - 0.4 * (high - low), high + 0.4 * (high - low), 61)
     parts = {name: at * weight / len(weights) for name, weight in weights.items()}
     states = [State(*(parts.get(name, 0.0 * at)[k] for name in State._fields)) for k in range(61)]
-    found = [growth.py_func(q, e) for q in states]
+    terms = Terms(*(getattr(e, f"law{slot}_{name}") for name in Terms._fields))
+    found = [growth.py_func(q, terms) for q in states]
     met = np.abs(at) if argument.startswith("|") else at
     expected = np.interp(met, np.linspace(low, high, KNOTS), GROWTH)
     np.testing.assert_allclose(found, np.maximum(expected, -1.0), rtol=0, atol=1e-9)
@@ -63,8 +64,8 @@ def test_growth_is_linear_between_its_knots_and_constant_beyond(argument, slot, 
 @pytest.mark.parametrize("growths", [(0.5,), (0.25, 0.2)], ids=["one law", "two laws"])
 def test_a_constant_law_is_a_larger_effect(growths):
     p = CALIBRATED.replace(F_PV=4.0)
-    for slot, growth in enumerate(growths, start=1):
-        p = p.replace(**law("piston_friction", growth=KNOTS * (growth,), slot=slot))
+    for slot, constant in enumerate(growths, start=1):
+        p = p.replace(**law("piston_friction", growth=KNOTS * (constant,), slot=slot))
     np.testing.assert_allclose(openings(p), openings(CALIBRATED.replace(F_PV=6.0)), rtol=1e-9)
 
 

@@ -155,7 +155,7 @@ def test_probabilities_that_are_none_are_refused(wrong):
 )
 def test_a_bad_choice_is_refused(choices, message):
     with pytest.raises(ParameterError, match=message):
-        Region.from_choices(choices, CENTRE)
+        Region(centre=CENTRE).changed(choices)
 
 
 @pytest.mark.parametrize(
@@ -175,7 +175,7 @@ def test_a_bad_joint_region_is_refused(wrong):
 
 def test_a_pressure_written_in_bar_is_refused_with_its_value_in_pascal():
     with pytest.raises(ParameterError, match=r"b_p2 = 0.256 is in Pa.* write 25600 if you"):
-        Region.from_choices({"b_p2": 0.256}, CENTRE)
+        Region(centre=CENTRE).changed({"b_p2": 0.256})
     with pytest.raises(ParameterError, match="write 25600"):
-        Region.from_choices({"b_p2": (0.0, 0.256)}, CENTRE)
-    assert Region.from_choices({"b_p2": 25600.0, "b_p3": 0.0}, CENTRE).centre["b_p2"] == 25600.0
+        Region(centre=CENTRE).changed({"b_p2": (0.0, 0.256)})
+    assert Region(centre=CENTRE).changed({"b_p2": 25600.0, "b_p3": 0.0}).centre["b_p2"] == 25600.0

@@ -13,6 +13,7 @@ from controllers.tuned import tuned
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.plantfile import Plant
 from epv_env.signals import RecordedConsumption
+from identification.gap.search.onset import Onset
 from identification.recordings.log_files import Drive, Log
 from training import closed_loop
 from training.closed_loop import KINDS, ClosedLoop, consumption, sentence
@@ -81,7 +82,7 @@ def test_nothing_is_claimed_without_an_effect():
 def test_only_drives_in_which_the_cause_acts_count():
     loop = ClosedLoop(logged(), PLANT, policy())
     kept = SimpleNamespace(labels=("lag",), title="lag of p2")
-    found: Any = SimpleNamespace(onset=("drive-1.csv", 0.99), kept=kept)
+    found: Any = SimpleNamespace(onset=Onset("drive-1.csv", 0.99, None), kept=kept)
     (section,) = loop.sections(found, with_effect(tau_p2=0.02))
     table: Any = section.blocks[0]
     assert table.columns[3] == "with lag of p2"

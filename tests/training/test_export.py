@@ -272,7 +272,7 @@ def test_a_monitor_goes_out_compiled_and_the_contract_names_its_effects(tmp_path
     )
     assert {path.name for path in out.iterdir()} >= set(monitor_c.FILES)
     named = json.loads((out / "contract.json").read_text())["monitor"]["effects"]
-    assert named == ["first", "second", "unknown"]
+    assert named == ["first", "second", "unknown", "return"]
     with pytest.raises(ExportError, match="false does not compile the exported code"):
         monitor_c.compiled_sources(white_model(), ["false"])
 

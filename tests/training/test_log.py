@@ -40,9 +40,3 @@ def test_what_cannot_be_logged_is_one_sentence(words, message, tmp_path, capsys)
     assert log("--out", tmp_path / "log", *words) == 2
     assert message in capsys.readouterr().err.splitlines()[-1]
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_log_is_not_overwritten(tmp_path, capsys):
-    (tmp_path / "drive-1.csv").touch()
-    assert log("--out", tmp_path) == 2
-    assert "holds files already: give another folder" in capsys.readouterr().err

@@ -134,7 +134,6 @@ def test_a_plant_of_other_sensors_is_swept_anew(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["--controllers", "nobody"], "no controller 'nobody': give PPO, hysteresis"),
         (["--factors", "luck"], "no factor 'luck' in the designs"),
         (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
         (["--device", "cuda"], "needs an NVIDIA accelerator"),

@@ -11,6 +11,8 @@ A policy is written only after its C code was compiled here and agreed with the 
 import hashlib
 import json
 import os
+import secrets
+import shutil
 import tempfile
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
@@ -157,11 +159,14 @@ def check_free(folder: Path) -> None:
 def write_folder(folder: Path, files: dict[str, bytes]) -> None:
     """Put these files in place of an earlier export's; a failure to write leaves the earlier ones."""
     folder.mkdir(parents=True, exist_ok=True)
-    with tempfile.TemporaryDirectory(dir=folder.resolve().parent, prefix=".export.") as new:
+    new = folder / f".export.{secrets.token_hex(4)}"
+    try:
         for name, content in files.items():
-            write_bytes(Path(new, name), content)
+            write_bytes(new / name, content)
         for path in folder.iterdir():
-            if path.name not in (*files, LOCK_FILE):
+            if path.name not in (*files, LOCK_FILE, new.name):
                 path.unlink()
         for name in files:
-            os.replace(Path(new, name), folder / name)
+            os.replace(new / name, folder / name)
+    finally:
+        shutil.rmtree(new, ignore_errors=True)

@@ -101,9 +101,8 @@ def controller_c(export: Export) -> ControllerC:
     c.function(valve_learner.observe, (VALVE, PLANT, PLANT, ARRAY, REAL, REAL, REAL))
     c.function(pulse.plan, (VALVE, PLANT, PLANT, PLANT, REAL))
     c.function(knowledge.shown, (REAL, REAL))
-    c.function(knowledge.cannot_raise, (VALVE,))
-    c.function(knowledge.would_rise_too_far, (VALVE,))
-    c.function(knowledge.below_band, (VALVE, ARRAY))
+    c.function(knowledge.above_band, (REAL,))
+    c.function(knowledge.forced, (VALVE, REAL))
     return c
 
 
@@ -126,6 +125,7 @@ def sources(export: Export) -> dict[str, str]:
         "layers": len(layers),
         "widest": export.widest,
         "action": INDEX["action"],
+        "error": INDEX["p2_error"],
         "since": INDEX["since_switching"],
         "learnt": learnt,
         "records": "\n".join(map(c.structure, RECORDS)),
@@ -181,8 +181,11 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         },
         "actions": {"0": "coil off: the protection valve opens", "1": "coil on: it shuts"},
         "decision": "1 if a rule says so; else 0 if the logit of off is at least that of on, else 1; "
-        "where p3 is implausible or readings are lost, a hysteresis that does not read p3 decides",
-        "timing": "read, decide and switch at each period's start; the coil stays so through it",
+        "where p3 is implausible or readings are lost, a hysteresis that does not read p3 decides, and "
+        "of the rules the shield above the band remains",
+        "timing": "read, decide and switch at each period's start; the coil stays so through it. Time "
+        "counts in calls: called more often, waits end early and the learnt rates are wrong; jitter of "
+        "a call shifts its readings. The stated agreement holds for the period alone",
         "operations": {
             "multiply_accumulates": sum(weights for weights, _ in sizes),
             "tanh": tangents,

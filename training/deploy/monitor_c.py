@@ -18,7 +18,7 @@ CONSTANTS = {
     name.lower(): getattr(monitor, name)
     for name in (
         "BEFORE", "AFTER", "SHORTEST", "LONGEST", "REST", "FLAT", "RISE", "SHUT", "CLIPPED", "MEMORY",
-        "BEFORE_START", "QUADRATIC", "LINEAR", "LEAST",
+        "BEFORE_START", "QUADRATIC", "LINEAR", "LEAST", "SETTLING", "RELEARNT",
     )
 }  # fmt: skip
 
@@ -36,7 +36,7 @@ def sources(model: MonitorModel) -> dict[str, str]:
     numbers = {
         "conditions": len(CONDITIONS), "kink_count": len(monitor.KINKS),
         "terms": model.expected.shape[1], "features": len(FEATURES),
-        "count": len(shifts), "causes": len(effects), "period": Monitor.period,
+        "count": len(names), "causes": len(effects), "period": Monitor.period,
         "rows": monitor.BEFORE + monitor.LONGEST + monitor.AFTER,
     }  # fmt: skip
     values = {name: braced(array.tolist()) for name, array in arrays.items()}
@@ -56,7 +56,7 @@ def compiled_sources(model: MonitorModel, compiler: list[str]) -> dict[str, str]
 
 
 def effects_of(model: MonitorModel) -> list[str]:
-    """Names of the effects in the order of the C code, the last "unknown"; they are no part of it."""
+    """Names of the effects in the order of the C code, then "unknown" and "return"; no part of it."""
     return list(dict.fromkeys(Monitor(model).hypotheses()[3]))
 
 

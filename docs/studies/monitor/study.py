@@ -16,7 +16,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from controllers.base import Controller
-from controllers.monitor import Monitor, MonitorModel
+from controllers.monitor import RETURN, SHIPPED, Monitor, MonitorModel
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
@@ -27,7 +27,6 @@ from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from training.drives import DRIVE, drives
-from training.monitoring import monitor_model
 
 FOLDER = Path(__file__).parent
 SEED = 4977
@@ -56,48 +55,51 @@ class Fleet:
         self.parameters = [self.plant.region.draw(self.rng) for _ in range(valves)]
         self.monitors = [Monitor(model) for _ in range(valves)]
 
-    def drive(self, parameters: Sequence[Parameters]) -> list[bool]:
-        """One drive of every valve with these parameters; which monitors have given an alarm in it."""
+    def drive(self, parameters: Sequence[Parameters]) -> None:
+        """One drive of every valve with these parameters."""
         seeds = self.rng.integers(2**32, size=len(self.monitors)).tolist()
         voltage = self.rng.uniform(*VOLTAGES)
         readings = drives(
             self.plant, self.controller, seeds, {"parameters": list(parameters)}, voltage=voltage
         )
-        return [alarm_in(monitor, drive) for monitor, drive in zip(self.monitors, readings, strict=True)]
+        for monitor, drive in zip(self.monitors, readings, strict=True):
+            monitor.follow(drive)
 
 
-def alarm_in(monitor: Monitor, drive: np.ndarray) -> bool:
-    """Whether the monitor gives an alarm in a drive (periods, 6)."""
-    begun = monitor.time
-    monitor.follow(drive)
-    return any(log_odds > 0.0 for time, log_odds in monitor.history if time > begun)
+def alarms_of(monitor: Monitor) -> int:
+    """How often the statistic has passed the threshold from below."""
+    over = np.array([log_odds > 0.0 for _, log_odds in monitor.history])
+    return int(np.sum(np.diff(over.astype(int), prepend=0) > 0))
 
 
 def false_alarms(model: MonitorModel, kind: str, number: int, count: int) -> dict[str, Any]:
     """Alarms of unchanged valves in `count` drives of each."""
     fleet = Fleet(model, kind, UNCHANGED, [SEED, number, 0])
-    alarms = 0
     for _ in range(count):
-        for monitor, alarm in zip(fleet.monitors, fleet.drive(fleet.parameters), strict=True):
-            alarms += alarm
-            if alarm:
-                monitor.restart()
+        fleet.drive(fleet.parameters)
+    alarms = sum(alarms_of(monitor) for monitor in fleet.monitors)
     return {"hours": count * UNCHANGED * DRIVE / 3600.0, "alarms": alarms}
 
 
 def detection(model: MonitorModel, kind: str, effect: Any, number: int) -> dict[str, Any]:
-    """Each valve's answer after an effect of random size has begun."""
+    """Each valve's answers after an effect of random size has begun, and after it is mended."""
     fleet = Fleet(model, kind, VALVES, [SEED, number, 1])
     for _ in range(BEFORE):
         fleet.drive(fleet.parameters)
-    early = [monitor.alarm for monitor in fleet.monitors]
+    early = [len(monitor.changes) for monitor in fleet.monitors]
     changed = [parameters.replace(**sizes(effect, fleet.rng)) for parameters in fleet.parameters]
     for _ in range(AFTER):
         fleet.drive(changed)
+    first = [m.changes[n:][:1] for m, n in zip(fleet.monitors, early, strict=True)]
+    seen = [len(monitor.changes) for monitor in fleet.monitors]
+    for _ in range(AFTER):
+        fleet.drive(fleet.parameters)
+    later = [m.changes[n:] for m, n in zip(fleet.monitors, seen, strict=True)]
     return {
-        "found": [m.alarm and not was for m, was in zip(fleet.monitors, early, strict=True)],
-        "right": [next(iter(m.causes())) == effect.name for m in fleet.monitors],
-        "late_s": [round(m.onset - BEFORE * DRIVE, 2) for m in fleet.monitors],
+        "found": [bool(change) and not n for change, n in zip(first, early, strict=True)],
+        "right": [bool(c) and next(iter(c[0].causes)) == effect.name for c in first],
+        "late_s": [round(c[0].onset - BEFORE * DRIVE, 2) if c else 0.0 for c in first],
+        "returned": [any(next(iter(c.causes)) == RETURN for c in changes) for changes in later],
     }
 
 
@@ -163,14 +165,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     runs, count = (1, 1) if options.quick else (RUNS, DRIVES)
-    path = options.work / "monitor.json"
-    if not path.exists():
-        monitor_model(load_plant(None)).save(path)
     subject = {"seed": SEED, "valves": VALVES, "quick": options.quick}
     journal = Journal(options.out / "results.jsonl", subject)
     missing = {
         name: task
-        for name, task in tasks(MonitorModel.load(path), runs, count).items()
+        for name, task in tasks(MonitorModel.load(SHIPPED), runs, count).items()
         if name not in journal
     }
     for name in progress(missing, what="monitor"):

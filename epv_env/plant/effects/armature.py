@@ -37,15 +37,9 @@ ARMATURE_PRESSURE_FORCE = Effect(
         ),
     ),
     constants=(
-        Constant(
-            name="inlet_area",
-            meaning="area on which p1 - p3 pulls the armature in [m^2]",
-            value=lambda p: p["sFMV"] * QUARTER_PI * p["dMVin"] ** 2,
-        ),
-        Constant(
-            name="exhaust_area",
-            meaning="area on which p3 - p_env pushes it back [m^2]",
-            value=lambda p: p["sFMV"] * QUARTER_PI * p["dMVexh"] ** 2,
-        ),
+        # area on which p1 - p3 pulls the armature in [m^2]
+        Constant("inlet_area", lambda p: p["sFMV"] * QUARTER_PI * p["dMVin"] ** 2),
+        # area on which p3 - p_env pushes it back [m^2]
+        Constant("exhaust_area", lambda p: p["sFMV"] * QUARTER_PI * p["dMVexh"] ** 2),
     ),
 )

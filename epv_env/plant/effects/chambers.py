@@ -8,15 +8,6 @@ from numpy.typing import NDArray
 from epv_env.plant.effects.record import Constant, Effect, Size, rate
 from epv_env.plant.primitives import KAPPA, LAMINAR_DROP, QUARTER_PI, inlined
 
-SMALLEST_SHARE = 0.01
-"""Share of V2 behind its pipe below which no pipe acts [-]."""
-
-HEAT_FORM = "T = T_env (1 + h); dp/dt = κ (RT/V (w_in − (1 + h) w_out) − p V'/V) − p h/((1 + h) τ)"
-HEAT_SOURCE = (
-    "first law for an open chamber, air entering at T_env, heat to the wall by Newton's law: τ → 0 "
-    "isothermal, τ → ∞ adiabatic"
-)
-
 
 def _heat(chamber: str, number: int, size: Size) -> Effect:
     """Gas of a chamber whose temperature departs from T_env and relaxes to the wall's."""
@@ -25,20 +16,17 @@ def _heat(chamber: str, number: int, size: Size) -> Effect:
         name=f"{chamber}_heat",
         component=chamber,
         strength=(f"exchange_{number}",),
-        form=HEAT_FORM,
-        source=HEAT_SOURCE,
+        form="T = T_env (1 + h); dp/dt = κ (RT/V (w_in − (1 + h) w_out) − p V'/V) − p h/((1 + h) τ)",
+        source=(
+            "first law for an open chamber, air entering at T_env, heat to the wall by Newton's law: "
+            "τ → 0 isothermal, τ → ∞ adiabatic"
+        ),
         sizes=(size,),
         constants=(
-            Constant(
-                name=f"warm_{number}",
-                meaning="1 where the chamber's gas temperature is free, 0 where it is T_env [-]",
-                value=lambda p: np.sign(rate(p[symbol])),
-            ),
-            Constant(
-                name=f"exchange_{number}",
-                meaning="rate at which that temperature relaxes to the wall's [1/s]",
-                value=lambda p: rate(p[symbol]),
-            ),
+            # 1 where the chamber's gas temperature is free, 0 where it is T_env [-]
+            Constant(f"warm_{number}", lambda p: np.sign(rate(p[symbol]))),
+            # rate at which that temperature relaxes to the wall's [1/s]
+            Constant(f"exchange_{number}", lambda p: rate(p[symbol])),
         ),
         fastest_rate=lambda p: rate(p[symbol]),
     )
@@ -89,18 +77,15 @@ MOVING_CONTROL_VOLUME = Effect(
         ),
     ),
     constants=(
-        Constant(
-            name="swept",
-            meaning="swept area over the control chamber's volume [1/m]",
-            value=lambda p: p["sV3"] * QUARTER_PI * p["d1"] ** 2 / p["V3"],
-        ),
+        # swept area over the control chamber's volume [1/m]
+        Constant("swept", lambda p: p["sV3"] * QUARTER_PI * p["d1"] ** 2 / p["V3"]),
     ),
 )
 
 
 def _far_share(p: Mapping[str, NDArray]) -> NDArray:
-    """Share of V2 behind the pipe [-], 0 where the pipe is too small to act."""
-    return np.where(p["s_pipe"] < SMALLEST_SHARE, 0.0, p["s_pipe"])
+    """Share of V2 behind the pipe [-], 0 where it is less than a hundredth: no pipe acts then."""
+    return np.where(p["s_pipe"] < 0.01, 0.0, p["s_pipe"])
 
 
 def _piped(p: Mapping[str, NDArray]) -> NDArray:
@@ -160,27 +145,14 @@ OUTPUT_PIPE = Effect(
         ),
     ),
     constants=(
-        Constant(
-            name="pipe_on",
-            meaning="1 where part of the circuit lies behind a pipe, else 0 [-]",
-            value=_piped,
-        ),
-        Constant(
-            name="pipe_area",
-            meaning="effective area of that pipe [m^2]",
-            value=lambda p: _piped(p) * p["A_pipe"],
-        ),
-        Constant(
-            name="near_share",
-            meaning="V2 over its part before the pipe [-]",
-            value=_per_near_share,
-            is_size=False,
-        ),
-        Constant(
-            name="far_share",
-            meaning="V2 over its part behind the pipe [-]; 0 without one",
-            value=_per_far_share,
-        ),
+        # 1 where part of the circuit lies behind a pipe, else 0 [-]
+        Constant("pipe_on", _piped),
+        # effective area of that pipe [m^2]
+        Constant("pipe_area", lambda p: _piped(p) * p["A_pipe"]),
+        # V2 over its part before the pipe [-]
+        Constant("near_share", _per_near_share, is_size=False),
+        # V2 over its part behind the pipe [-]; 0 without one
+        Constant("far_share", _per_far_share),
     ),
     fastest_rate=_pipe_rate,
 )

@@ -2,7 +2,7 @@
 
 import math
 
-from epv_env.plant.effects.record import Constant, Effect, Size
+from epv_env.plant.effects.record import Effect, Size
 from epv_env.plant.primitives import inlined
 
 OFF_VOLTAGE = 1.0
@@ -31,6 +31,7 @@ COIL_HEATING = Effect(
     sizes=(
         Size(
             symbol="h_coil",
+            constant="heating",
             unit="K/J",
             domain=(0, 2),
             meaning="temperature rise of the winding per energy turned into heat",
@@ -39,6 +40,7 @@ COIL_HEATING = Effect(
         ),
         Size(
             symbol="theta_coil",
+            constant="coil_start",  # it sets the state, not its rates
             unit="K",
             domain=(-60, 100),
             meaning="temperature rise of the winding at the start",
@@ -49,19 +51,6 @@ COIL_HEATING = Effect(
         ),
     ),
     alternatives={"": ("h_coil",), "start": ("theta_coil",)},
-    constants=(
-        Constant(
-            name="heating",
-            meaning="temperature rise of the winding per energy turned into heat [K/J]",
-            value=lambda p: p["h_coil"],
-        ),
-        Constant(
-            name="coil_start",
-            meaning="how warm the winding is at the start [K]: it sets the state, not its rates",
-            value=lambda p: p["theta_coil"],
-            in_equations=False,
-        ),
-    ),
 )
 
 EDDY_CURRENT = Effect(
@@ -76,18 +65,12 @@ EDDY_CURRENT = Effect(
     sizes=(
         Size(
             symbol="G_eddy",
+            constant="eddy",
             unit="S",
             domain=(0, 0.02),
             meaning="conductance of the shorted turn in the iron, seen from the coil",
             trials=(2e-3,),
             drawn=(8e-4, 8e-3),
-        ),
-    ),
-    constants=(
-        Constant(
-            name="eddy",
-            meaning="conductance of the shorted turn in the iron, seen from the coil [S]",
-            value=lambda p: p["G_eddy"],
         ),
     ),
 )
@@ -103,18 +86,12 @@ FLYBACK_VOLTAGE = Effect(
     sizes=(
         Size(
             symbol="U_clamp",
+            constant="U_clamp",
             unit="V",
             domain=(0, 60),
             meaning="voltage of the diode or clamp against which the current decays",
             trials=(0.7, 8.0, 40.0),
             drawn=(0.7, 45.0),
-        ),
-    ),
-    constants=(
-        Constant(
-            name="U_clamp",
-            meaning="voltage against which the current decays [V]",
-            value=lambda p: p["U_clamp"],
         ),
     ),
 )
@@ -128,18 +105,12 @@ DRIVER_VOLTAGE_DROP = Effect(
     sizes=(
         Size(
             symbol="U_drop",
+            constant="U_drop",
             unit="V",
             domain=(0, 3),
             meaning="voltage that the power stage keeps from the coil while it is on",
             trials=(0.7,),
             drawn=(0.2, 2.0),
-        ),
-    ),
-    constants=(
-        Constant(
-            name="U_drop",
-            meaning="voltage that the power stage keeps from the coil [V]",
-            value=lambda p: p["U_drop"],
         ),
     ),
 )

@@ -20,19 +20,13 @@ PRESSURE_DEPENDENT_DISCHARGE = Effect(
     sizes=(
         Size(
             symbol="kalpha",
+            constant="discharge_slope",
             unit="1",
             domain=(-0.5, 0.5),
             meaning="relative rise of alphaPV from p2 = p1 to p2 = 0",
             trials=(0.1, -0.1),
             drawn=(0.04, 0.4),
             either_sign=True,
-        ),
-    ),
-    constants=(
-        Constant(
-            name="discharge_slope",
-            meaning="relative rise of alphaPV with 1 - p2/p1 [-]",
-            value=lambda p: p["kalpha"],
         ),
     ),
 )
@@ -57,11 +51,8 @@ CRITICAL_PRESSURE_RATIO = Effect(
         ),
     ),
     constants=(
-        Constant(
-            name="drop_deficit",
-            meaning="1 less the share of the pressure drop that counts towards choking [-]",
-            value=lambda p: p["dbcrit"] / (1 - CRITICAL_RATIO + p["dbcrit"]),
-        ),
+        # 1 less the share of the pressure drop that counts towards choking [-]
+        Constant("drop_deficit", lambda p: p["dbcrit"] / (1 - CRITICAL_RATIO + p["dbcrit"])),
     ),
 )
 
@@ -74,18 +65,12 @@ FLOW_FORCE = Effect(
     sizes=(
         Size(
             symbol="cflow",
+            constant="flow_force",
             unit="1",
             domain=(0, 1.5),
             meaning="force of the PV jet per area and pressure drop",
             trials=(0.3,),
             drawn=(0.1, 1.0),
-        ),
-    ),
-    constants=(
-        Constant(
-            name="flow_force",
-            meaning="force of the PV jet per opened area and pressure drop [-]",
-            value=lambda p: p["cflow"],
         ),
     ),
 )
@@ -99,28 +84,22 @@ LOCAL_GAS_SPEED = Effect(
     sizes=(
         Size(
             symbol="a1",
+            constant="a1",
             trials=(0.02, -0.02),
             drawn=(5e-3, 5e-2),
             either_sign=True,
         ),
         Size(
             symbol="a2",
+            constant="a2",
             trials=(1e-4,),
             drawn=(4e-5, 4e-4),
         ),
     ),
     alternatives={"a1": ("a1",), "a2": ("a2",)},
     constants=(
-        Constant(name="a1", meaning="cone model: constant angle [rad]", value=lambda p: p["a1"]),
-        Constant(
-            name="a2", meaning="cone model: angle per gas speed [rad s/m]", value=lambda p: p["a2"]
-        ),
-        Constant(
-            name="RT",
-            meaning="R T of the supply air, which turns a pressure ratio into a gas speed [J/kg]",
-            value=lambda p: p["R_gas"] * p["T_env"],
-            is_size=False,
-        ),
+        # R T of the supply air, which turns a pressure ratio into a gas speed [J/kg]
+        Constant("RT", lambda p: p["R_gas"] * p["T_env"], is_size=False),
     ),
 )
 
@@ -158,30 +137,15 @@ SUPPLY_RESTRICTION = Effect(
         ),
     ),
     constants=(
-        Constant(
-            name="supply_loss",
-            meaning="pressure lost before the valve, times p1 over the flow squared [Pa^2 s^2/kg^2]",
-            value=lambda p: 0.5 * (p["R_gas"] * p["T_env"]) * p["z_supply"] ** 2,
-        ),
-        Constant(
-            name="supply_PV",
-            meaning="share of that pressure that the PV feels, and of its flow that loses it [-]",
-            value=lambda p: 1 + p["wPV_supply"],
-            is_size=False,
-        ),
-        Constant(
-            name="supply_MV",
-            meaning="the same for the MV [-]",
-            value=lambda p: 1 + p["wMV_supply"],
-            is_size=False,
-        ),
+        # pressure lost before the valve, times p1 over the flow squared [Pa^2 s^2/kg^2]
+        Constant("supply_loss", lambda p: 0.5 * (p["R_gas"] * p["T_env"]) * p["z_supply"] ** 2),
+        # share of that pressure that the PV feels, and of its flow that loses it [-]
+        Constant("supply_PV", lambda p: 1 + p["wPV_supply"], is_size=False),
+        # the same for the MV [-]
+        Constant("supply_MV", lambda p: 1 + p["wMV_supply"], is_size=False),
     ),
     fastest_rate=lambda p: np.where(np.asarray(p["z_supply"]) > 0, 1 / FILLING_TIME, 0.0),
 )
-
-
-SMALLEST_ROOT = 0.5
-"""Fourth root of the pressure ratio down to which `gas_speed` is within 2e-9; below it errs by more."""
 
 
 def heat_drop_over_drop(u: np.ndarray) -> np.ndarray:
@@ -190,8 +154,11 @@ def heat_drop_over_drop(u: np.ndarray) -> np.ndarray:
 
 
 def _fit() -> tuple[float, ...]:
-    """Chebyshev interpolation of `heat_drop_over_drop`, as plain powers."""
-    nodes = (chebyshev.chebpts1(8) + 1) / 2 * (1 - SMALLEST_ROOT)
+    """Chebyshev interpolation of `heat_drop_over_drop`, as plain powers.
+
+    `gas_speed` is within 2e-9 down to a fourth root of the pressure ratio of 0.5; below it errs by more.
+    """
+    nodes = (chebyshev.chebpts1(8) + 1) / 2 * (1 - 0.5)
     return tuple(Polynomial.fit(nodes, heat_drop_over_drop(nodes), 7).convert().coef.tolist())
 
 

@@ -2,7 +2,7 @@
 
 import math
 
-from epv_env.plant.effects.record import Constant, Effect, Size
+from epv_env.plant.effects.record import Effect, Size
 from epv_env.plant.primitives import inlined
 
 SLIDING_SPEED_MV = 0.02
@@ -23,18 +23,12 @@ ARMATURE_FRICTION = Effect(
     sizes=(
         Size(
             symbol="F_MV",
+            constant="friction_MV",
             unit="N",
             domain=(0, 2),
             meaning="Coulomb friction of the armature",
             trials=(0.3,),
             drawn=(0.1, 1.0),
-        ),
-    ),
-    constants=(
-        Constant(
-            name="friction_MV",
-            meaning="Coulomb friction of the armature [N]",
-            value=lambda p: p["F_MV"],
         ),
     ),
 )
@@ -51,6 +45,7 @@ PISTON_FRICTION = Effect(
     sizes=(
         Size(
             symbol="F_PV",
+            constant="friction_PV",
             unit="N",
             domain=(0, 30),
             meaning="Coulomb friction of the PV piston's seals",
@@ -59,23 +54,12 @@ PISTON_FRICTION = Effect(
         ),
         Size(
             symbol="S_PV",
+            constant="breakaway_PV",
             unit="1",
             domain=(0, 2),
             meaning="excess of the piston's friction at rest over that in motion",
             drawn=(0.1, 1.0),
             spread=0.5,
-        ),
-    ),
-    constants=(
-        Constant(
-            name="friction_PV",
-            meaning="Coulomb friction of the piston [N]",
-            value=lambda p: p["F_PV"],
-        ),
-        Constant(
-            name="breakaway_PV",
-            meaning="relative excess of that friction at rest [-]",
-            value=lambda p: p["S_PV"],
         ),
     ),
 )

@@ -7,8 +7,10 @@ such as p3, and g is linear between nine knots and constant beyond them. Two law
 effect or on two; their factors multiply.
 """
 
+from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -127,87 +129,81 @@ def placed(
 
 def laws_of(p: Mapping[str, float], names: tuple[str, ...]) -> tuple[Law, ...]:
     """The laws that parameters by symbol hold. names: of all effects, in the catalogue's order."""
-    found = []
+    laws = []
     for slot in SLOTS:
         effect, argument, low, high = (p[symbol] for symbol in place_symbols(slot))
         if effect and argument:
             name = list(ARGUMENTS)[round(argument) - 1]
             growth = tuple(p[symbol] for symbol in knot_symbols(slot))
-            found.append(
+            laws.append(
                 Law(effect=names[round(effect) - 1], argument=name, unit=ARGUMENTS[name][0], low=low,
                     high=high, growth=growth)
             )  # fmt: skip
-    return tuple(found)
+    return tuple(laws)
 
 
 def arguments_of(q: Any) -> dict[str, NDArray]:
     """Every argument by name, of any shape [SI]; q: states as arrays of this shape."""
-    found = {}
+    arguments = {}
     for name, (_, weights) in ARGUMENTS.items():
         value = sum(weight * np.asarray(getattr(q, part)) for part, weight in weights.items())
-        found[name] = np.abs(value) if name.startswith("|") else np.asarray(value)
-    return found
+        arguments[name] = np.abs(value) if name.startswith("|") else np.asarray(value)
+    return arguments
 
 
-def _per_interval(p: Mapping[str, NDArray], slot: int) -> NDArray:
+Terms = namedtuple(
+    "Terms", [*(f"by_{part}" for part in PARTS), "first", *(f"bend_{k}" for k in range(KNOTS))]
+)
+"""A law as the equations use it, each a row of the kernel's table: by_PART, knots per unit of a part of
+the argument [1/SI]; first, the argument at the first knot [intervals]; bend_0, g there [1], and the
+changes of its slope at the knots [1/interval]."""
+
+
+def _per_interval(slot: int, p: Mapping[str, NDArray]) -> NDArray:
     """Knots per unit of the argument; 0 without a law."""
     width = (p[f"law{slot}_high"] - p[f"law{slot}_low"]) / (KNOTS - 1)
     return np.where(width > 0.0, 1.0 / np.maximum(width, 1e-9), 0.0)
 
 
-def _weight(slot: int, part: str) -> Callable[[Mapping[str, NDArray]], Value]:
-    """How a part of the argument counts, in knots per unit."""
-
-    def value(p: Mapping[str, NDArray]) -> Value:
-        weights = [own.get(part, 0.0) for _, own in ARGUMENTS.values()]
-        codes = enumerate(weights, start=1)
-        total = sum(np.where(p[f"law{slot}_argument"] == code, w, 0.0) for code, w in codes if w)
-        return total * _per_interval(p, slot)
-
-    return value
+def _by(slot: int, part: str, p: Mapping[str, NDArray]) -> NDArray:
+    """Knots per unit of a part of the argument."""
+    weights = enumerate((weights.get(part, 0.0) for _, weights in ARGUMENTS.values()), start=1)
+    place = p[f"law{slot}_argument"]
+    return sum(np.where(place == k, w, 0.0) for k, w in weights if w) * _per_interval(slot, p)
 
 
-def _bend(slot: int, knot: int) -> Callable[[Mapping[str, NDArray]], Value]:
-    """Change of the slope of g at a knot [1/interval]; the value itself at the first one."""
-    symbols = knot_symbols(slot)
-
-    def value(p: Mapping[str, NDArray]) -> Value:
-        if knot == 0:
-            return p[symbols[0]] + 0.0
-        slope = p[symbols[knot]] - p[symbols[knot - 1]]
-        return slope - (p[symbols[knot - 1]] - p[symbols[knot - 2]]) if knot > 1 else slope
-
-    return value
+def _first(slot: int, p: Mapping[str, NDArray]) -> NDArray:
+    """Argument at the first knot."""
+    return p[f"law{slot}_low"] * _per_interval(slot, p)
 
 
-def _acts_on(slot: int, place: int) -> Callable[[Mapping[str, NDArray]], Value]:
+def _bend(slot: int, knot: int, p: Mapping[str, NDArray]) -> Value:
+    """Change of the slope of g at a knot; the value itself at the first one."""
+    g = [p[symbol] for symbol in knot_symbols(slot)]
+    if knot == 0:
+        return g[0] + 0.0
+    slope = g[knot] - g[knot - 1]
+    return slope - (g[knot - 1] - g[knot - 2]) if knot > 1 else slope
+
+
+def _acts_on(slot: int, place: int, p: Mapping[str, NDArray]) -> NDArray:
     """1 where the law acts on an effect, else 0."""
-    return lambda p: np.where(p[f"law{slot}_effect"] == float(place), 1.0, 0.0)
+    return np.where(p[f"law{slot}_effect"] == float(place), 1.0, 0.0)
 
 
 def constants(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
-    """Rows of the kernel's table. effects: the catalogue."""
-    rows: list[Constant] = []
-
-    def add(name: str, meaning: str, value: Callable[..., Value]) -> None:
-        rows.append(Constant(name=name, meaning=meaning, value=value, is_size=False))
-
+    """Rows of the kernel's table, of each law those of Terms. effects: the catalogue."""
+    values: dict[str, Callable[[Mapping[str, NDArray]], Value]] = {}
     for slot in SLOTS:
-        for part in PARTS:
-            add(f"law{slot}_by_{part}", f"knots per unit of {part} [1/SI]", _weight(slot, part))
-        add(
-            f"law{slot}_first",
-            "argument at the first knot [intervals]",
-            lambda p, slot=slot: p[f"law{slot}_low"] * _per_interval(p, slot),
-        )
-        for k in range(KNOTS):
-            meaning = "g at the first knot [1]" if k == 0 else "change of its slope at a knot [1]"
-            add(f"law{slot}_{k}", meaning, _bend(slot, k))
-        for place, effect in enumerate(effects, start=1):
-            if effect.strength:
-                meaning = f"1 where the law acts on {effect.name}, else 0 [1]"
-                add(f"law{slot}_on_{effect.name}", meaning, _acts_on(slot, place))
-    return tuple(rows)
+        values |= {f"law{slot}_by_{part}": partial(_by, slot, part) for part in PARTS}
+        values[f"law{slot}_first"] = partial(_first, slot)
+        values |= {f"law{slot}_bend_{k}": partial(_bend, slot, k) for k in range(KNOTS)}
+        values |= {
+            f"law{slot}_on_{effect.name}": partial(_acts_on, slot, place)
+            for place, effect in enumerate(effects, start=1)
+            if effect.strength
+        }
+    return tuple(Constant(name, value, is_size=False) for name, value in values.items())
 
 
 def most_growth(p: Mapping[str, NDArray]) -> NDArray:
@@ -228,48 +224,16 @@ def bent(s, bend):
 
 
 @inlined
-def weighted(
-    q, p1, p2, p3, xPV, vPV, xMV, vMV, current, coil_heat, heat_3, heat_2, drop, far, lag_2, lag_3
-):
-    """Argument at a state [intervals], by the weight of each part; see ARGUMENTS."""
-    s = p1 * q.p1 + p2 * q.p2 + p3 * q.p3 + xPV * q.xPV + vPV * abs(q.vPV)
-    s += xMV * q.xMV + vMV * abs(q.vMV) + current * q.I + coil_heat * q.coil_heat
-    s += heat_3 * q.heat_3 + heat_2 * q.heat_2 + drop * q.supply_drop
-    return s + far * abs(q.far_pressure) + lag_2 * abs(q.lag_2) + lag_3 * abs(q.lag_3)
-
-
-@inlined
-def growth(s, g, b1, b2, b3, b4, b5, b6, b7, b8):
-    """g at s [intervals from the first knot], at least -1 [1], from its value there and its bends."""
-    s = min(max(s, 0.0), 8.0)
-    g += bent(s, b1) + bent(s - 1.0, b2) + bent(s - 2.0, b3) + bent(s - 3.0, b4)
-    g += bent(s - 4.0, b5) + bent(s - 5.0, b6) + bent(s - 6.0, b7) + bent(s - 7.0, b8)
-    return max(g, -1.0)
-
-
-@inlined
-def growth_1(q, e):
-    """g of the first law at a state, at least -1 [1]; e: Effects."""
-    s = weighted(
-        q, e.law1_by_p1, e.law1_by_p2, e.law1_by_p3, e.law1_by_xPV, e.law1_by_vPV, e.law1_by_xMV,
-        e.law1_by_vMV, e.law1_by_I, e.law1_by_coil_heat, e.law1_by_heat_3, e.law1_by_heat_2,
-        e.law1_by_supply_drop, e.law1_by_far_pressure, e.law1_by_lag_2, e.law1_by_lag_3,
-    )  # fmt: skip
-    return growth(
-        s - e.law1_first, e.law1_0, e.law1_1, e.law1_2, e.law1_3, e.law1_4, e.law1_5, e.law1_6,
-        e.law1_7, e.law1_8,
-    )  # fmt: skip
-
-
-@inlined
-def growth_2(q, e):
-    """The same of the second law."""
-    s = weighted(
-        q, e.law2_by_p1, e.law2_by_p2, e.law2_by_p3, e.law2_by_xPV, e.law2_by_vPV, e.law2_by_xMV,
-        e.law2_by_vMV, e.law2_by_I, e.law2_by_coil_heat, e.law2_by_heat_3, e.law2_by_heat_2,
-        e.law2_by_supply_drop, e.law2_by_far_pressure, e.law2_by_lag_2, e.law2_by_lag_3,
-    )  # fmt: skip
-    return growth(
-        s - e.law2_first, e.law2_0, e.law2_1, e.law2_2, e.law2_3, e.law2_4, e.law2_5, e.law2_6,
-        e.law2_7, e.law2_8,
-    )  # fmt: skip
+def growth(q, law):
+    """g at a state, at least -1 [1]; law: Terms."""
+    s = law.by_p1 * q.p1 + law.by_p2 * q.p2 + law.by_p3 * q.p3 + law.by_xPV * q.xPV
+    s += law.by_vPV * abs(q.vPV) + law.by_xMV * q.xMV + law.by_vMV * abs(q.vMV) + law.by_I * q.I
+    s += law.by_coil_heat * q.coil_heat + law.by_heat_3 * q.heat_3 + law.by_heat_2 * q.heat_2
+    s += law.by_supply_drop * q.supply_drop + law.by_far_pressure * abs(q.far_pressure)
+    s += law.by_lag_2 * abs(q.lag_2) + law.by_lag_3 * abs(q.lag_3)
+    s = min(max(s - law.first, 0.0), 8.0)
+    near = bent(s, law.bend_1) + bent(s - 1.0, law.bend_2) + bent(s - 2.0, law.bend_3)
+    near += bent(s - 3.0, law.bend_4)
+    far = bent(s - 4.0, law.bend_5) + bent(s - 5.0, law.bend_6) + bent(s - 6.0, law.bend_7)
+    far += bent(s - 7.0, law.bend_8)
+    return max(law.bend_0 + near + far, -1.0)

@@ -7,14 +7,11 @@ from numpy.typing import NDArray
 from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.primitives import QUARTER_PI, inlined
 
-GREATEST_CURRENT = 1.0
-"""Up to which saturation is followed [A] (Table 1's range)."""
-
 
 def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
     """Greatest reciprocal of the coil's differential inductance [1/H], shape as the parameters."""
     reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
-    level = p["sMV"] * p["N"] * (1 + p["wL_sat"]) * GREATEST_CURRENT / p["RML"]
+    level = p["sMV"] * p["N"] * (1 + p["wL_sat"]) / p["RML"]  # at 1 A, the end of Table 1's range
     return reluctance / p["N"] ** 2 * (1 + level) ** 2
 
 
@@ -52,16 +49,10 @@ MAGNETIC_SATURATION = Effect(
         ),
     ),
     constants=(
-        Constant(
-            name="saturation",
-            meaning="turns over the saturation flux: with I/Rm, how far the iron saturates [1/(V s)]",
-            value=lambda p: p["sMV"] * p["N"] * (1 + p["wL_sat"]),
-        ),
-        Constant(
-            name="force_saturation",
-            meaning="the same, as far as the force feels it [1/(V s)]",
-            value=lambda p: p["sMV"] * p["N"] * (1 + p["wF_sat"]),
-        ),
+        # turns over the saturation flux: with I/Rm, how far the iron saturates [1/(V s)]
+        Constant("saturation", lambda p: p["sMV"] * p["N"] * (1 + p["wL_sat"])),
+        # the same, as far as the force feels it [1/(V s)]
+        Constant("force_saturation", lambda p: p["sMV"] * p["N"] * (1 + p["wF_sat"])),
     ),
     fastest_rate=lambda p: p["R"] * inverse_inductance(p),
 )
@@ -75,18 +66,12 @@ MAGNETIC_REMANENCE = Effect(
     sizes=(
         Size(
             symbol="I_rem",
+            constant="I_rem",
             unit="A",
             domain=(0, 0.1),
             meaning="current that would make the iron's residual flux",
             trials=(0.015,),
             drawn=(5e-3, 5e-2),
-        ),
-    ),
-    constants=(
-        Constant(
-            name="I_rem",
-            meaning="current that would make the residual flux [A]",
-            value=lambda p: p["I_rem"],
         ),
     ),
 )

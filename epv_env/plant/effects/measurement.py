@@ -10,16 +10,10 @@ def _lag_constants(number: int) -> tuple[Constant, ...]:
     """Constants of a first-order sensor of p2 or p3."""
     symbol = f"tau_p{number}"
     return (
-        Constant(
-            name=f"lag_{number}_on",
-            meaning=f"1 where the sensor of p{number} lags, else 0 [-]",
-            value=lambda p: np.sign(rate(p[symbol])),
-        ),
-        Constant(
-            name=f"lag_{number}_rate",
-            meaning="reciprocal of its time constant [1/s]",
-            value=lambda p: rate(p[symbol]),
-        ),
+        # 1 where the sensor of p{number} lags, else 0 [-]
+        Constant(f"lag_{number}_on", lambda p: np.sign(rate(p[symbol]))),
+        # reciprocal of its time constant [1/s]
+        Constant(f"lag_{number}_rate", lambda p: rate(p[symbol])),
     )
 
 

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from operator import itemgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,6 +25,8 @@ class Size:
     """A number that sizes an effect: a row of the parameter table. SI units."""
 
     symbol: str
+    constant: str = ""
+    """Name by which compiled functions read the size as it is; "": they read `Effect.constants`."""
     unit: str = ""
     domain: tuple[float, float] | None = None
     """Physical range; 0 is off. None: the report's own tables hold this row (parameters.json)."""
@@ -66,18 +69,15 @@ class Size:
         return -drawn if self.either_sign and rng.uniform() < 0.5 else drawn
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True)
 class Constant:
     """A number that the compiled functions read, folded once per valve."""
 
     name: str
-    meaning: str
     value: Callable[[Mapping[str, NDArray]], Value]
     """From the parameters by symbol, each of shape (n,) or (), to the constant of the same shape."""
     is_size: bool = True
     """Whether a value other than zero means that the effect acts."""
-    in_equations: bool = True
-    """Whether a compiled function reads it; else it only says that the effect acts."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,7 +95,7 @@ class Effect:
     alternatives: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Symbols that act together, by the label of the variant; {}: one variant with all sizes."""
     constants: tuple[Constant, ...] = ()
-    """Rows of the kernel's table; () for an effect that acts outside of the equations."""
+    """What the compiled functions read beside the sizes with a `constant`."""
     strength: tuple[str, ...] = ()
     """Constants that a law multiplies (law.py); (): the effect has no law but its own."""
     fastest_rate: Callable[[Mapping[str, NDArray]], NDArray] | None = None
@@ -104,6 +104,12 @@ class Effect:
     def __post_init__(self) -> None:
         for fault in _faults(self):
             raise EffectError(f"effect {self.name!r}: {fault}")
+
+    @property
+    def rows(self) -> tuple[Constant, ...]:
+        """Rows of the kernel's table; () for an effect that acts outside of the equations."""
+        read = (Constant(s.constant, itemgetter(s.symbol)) for s in self.sizes if s.constant)
+        return (*read, *self.constants)
 
     @property
     def symbols(self) -> tuple[str, ...]:
@@ -140,10 +146,10 @@ def _faults(effect: Effect) -> list[str]:
         faults.append(f"unknown component {effect.component!r}: choose one of {', '.join(COMPONENTS)}")
     if not effect.sizes:
         faults.append("it has no size: give at least one")
-    unknown = {s for each in effect.alternatives.values() for s in each} - set(effect.symbols)
+    unknown = {s for symbols in effect.alternatives.values() for s in symbols} - set(effect.symbols)
     if unknown:
         faults.append(f"alternatives name {', '.join(sorted(unknown))}: give a Size for each")
-    strange = set(effect.strength) - {row.name for row in effect.constants}
+    strange = set(effect.strength) - {row.name for row in effect.rows}
     if strange:
         faults.append(f"strength names {', '.join(sorted(strange))}: name constants of the effect")
     for size in effect.sizes:

@@ -17,7 +17,7 @@ from epv_env.plant.effects import (
     measurement,
     seats,
 )
-from epv_env.plant.effects.law import growth_1, growth_2
+from epv_env.plant.effects.law import growth
 from epv_env.plant.effects.record import Effect, EffectError
 from epv_env.plant.effects.step_limits import step_limits
 from epv_env.plant.primitives import generated, inlined
@@ -61,7 +61,7 @@ PLACES = {name: place for place, name in enumerate(CATALOGUE, start=1)}
 """Number by which a law names its effect."""
 
 CONSTANTS = (
-    *(row for effect in EFFECTS for row in effect.constants),
+    *(row for effect in EFFECTS for row in effect.rows),
     *law.constants(EFFECTS),
     *step_limits(EFFECTS),
 )
@@ -72,6 +72,16 @@ Effects.__doc__ = "Constants of the effects as the equations use them (CONSTANTS
 
 LAWFUL = {name: record.name for record in EFFECTS for name in record.strength}
 """Effect of each constant that a law multiplies."""
+
+_first_law, _second_law = (
+    generated(
+        f"law_{slot}",
+        "e",
+        f"return Terms({', '.join(f'e.law{slot}_{name}' for name in law.Terms._fields)})",
+        Terms=law.Terms,
+    )
+    for slot in law.SLOTS
+)
 
 _scaled = generated(
     "scaled",
@@ -88,9 +98,9 @@ _scaled = generated(
 @inlined
 def with_laws(q, e):
     """The constants whose strengths follow their laws at a state q; e: Effects."""
-    g1 = growth_1(q, e)
-    g2 = growth_2(q, e)
-    return _scaled(e, g1, g2)
+    first = _first_law(e)
+    second = _second_law(e)
+    return _scaled(e, growth(q, first), growth(q, second))
 
 
 def effect(name: str) -> Effect:

@@ -1,7 +1,7 @@
 """How long a step the integrator may take with effects that are steep or fast."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -24,7 +24,7 @@ UNLIMITED = 1.0
 
 
 def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
-    """The longest steps as further constants of the kernel."""
+    """The longest steps as further constants of the kernel [s]."""
 
     def steady_step(p: Mapping[str, NDArray]) -> NDArray:
         fastest = np.full_like(p["s_pipe"], STABLE / UNLIMITED)
@@ -33,37 +33,18 @@ def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
                 fastest = np.maximum(fastest, effect.fastest_rate(p))
         return STABLE / (fastest * law.most_growth(p))
 
+    def step(rate: Callable[[Mapping[str, NDArray]], NDArray], stable: float) -> Callable[..., NDArray]:
+        """For a rate [1/s] that a law may raise."""
+        return lambda p: stable / np.maximum(rate(p) * law.most_growth(p), STABLE / UNLIMITED)
+
     return (
-        Constant(
-            name="steady_step",
-            meaning="longest step at which the integrator follows effects but clamp and friction [s]",
-            value=steady_step,
-            is_size=False,
-        ),
-        Constant(
-            name="clamp_step",
-            meaning="longest step at which it follows the current's decay against a clamp [s]",
-            value=lambda p: STABLE / np.maximum(_clamp_rate(p) * law.most_growth(p), STABLE / UNLIMITED),
-            is_size=False,
-        ),
-        Constant(
-            name="slow_step_PV",
-            meaning="longest step at which it follows the friction of a piston about to stop [s]",
-            value=lambda p: _friction_step(_friction_rate_PV(p), p),
-            is_size=False,
-        ),
-        Constant(
-            name="slow_step_MV",
-            meaning="the same of the armature [s]",
-            value=lambda p: _friction_step(_friction_rate_MV(p), p),
-            is_size=False,
-        ),
+        # for all effects but clamp and friction
+        Constant("steady_step", steady_step, is_size=False),
+        Constant("clamp_step", step(_clamp_rate, STABLE), is_size=False),
+        # for the friction of a mover about to stop
+        Constant("slow_step_PV", step(_friction_rate_PV, FRICTION_STABLE), is_size=False),
+        Constant("slow_step_MV", step(_friction_rate_MV, FRICTION_STABLE), is_size=False),
     )
-
-
-def _friction_step(rate: NDArray, p: Mapping[str, NDArray]) -> NDArray:
-    """Longest step for a friction that stops a mover at a rate [1/s], as strong as a law may make it."""
-    return FRICTION_STABLE / np.maximum(rate * law.most_growth(p), STABLE / UNLIMITED)
 
 
 def _clamp_rate(p: Mapping[str, NDArray]) -> NDArray:

@@ -40,6 +40,11 @@ class Hypothesis:
         """Labels of the causes."""
         return tuple(cause.label for cause in self.causes)
 
+    @property
+    def titles(self) -> tuple[str, ...]:
+        """The causes for people."""
+        return tuple(cause.title for cause in self.causes)
+
 
 @dataclass(frozen=True, kw_only=True)
 class NuisanceSlopes:

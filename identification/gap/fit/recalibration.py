@@ -9,10 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate
+from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, predict
 from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit, nuisance_slopes
-from identification.gap.fit.prediction import predict
 from identification.gap.plant import GreyBox
 from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio
 from identification.gap.prepare.prepared_plant import PreparedPlant, prepared

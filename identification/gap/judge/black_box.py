@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.prediction import Prediction
+from identification.gap.fit.evidence import Prediction
 from identification.gap.plant import GreyBox
 
 HISTORY_LAGS = (1, 2, 4, 10, 20, 40, 100, 400)

@@ -12,9 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.block_bootstrap import Interval, block_starts
+from identification.gap.fit.evidence import percentage_errors, predict
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import FLOOR, Gap, GapDraws, block_samples
-from identification.gap.fit.prediction import percentage_errors, predict
 from identification.gap.judge.black_box import predict_residuals
 from identification.gap.plant import GreyBox
 from identification.gap.prepare.time_scale import time_scale

@@ -10,8 +10,8 @@ from scipy.stats import norm
 
 from identification.block_bootstrap import LEVEL
 from identification.gap.diagnosis import Diagnosis
+from identification.gap.fit.evidence import predict
 from identification.gap.fit.laws import Law
-from identification.gap.fit.prediction import predict
 from identification.gap.locate.localisation import ForcingEstimate, MissingTerm
 from identification.gap.plant import GreyBox
 from identification.report.signals import over_time

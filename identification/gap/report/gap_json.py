@@ -133,7 +133,8 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
             if (twins := separability.twins(label))
         },
         "absorbed": list(separability.absorbed),
-        "onset": {"drive": onset[0], "probability": onset[1]} if onset else None,
+        "as_consumption": list(diagnosis.as_consumption),
+        "onset": asdict(onset) if onset else None,
         "warnings": diagnosis.warnings,
     }
 
@@ -157,6 +158,7 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
             for law, components in laws
         ],
         "converged": cause.hypothesis.converged,
+        "onset": {label: asdict(onset) for label, onset in diagnosis.onsets_of(cause).items()},
     }
     if label in diagnosis.reduction.shares_closed:
         entry["shrink"] = _fraction(diagnosis.share_closed(cause))

@@ -106,7 +106,8 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "share_left": share_left(diagnosis),
         "place": place(remainder(diagnosis)),
         "at_bounds": parameters_at_bounds(diagnosis),
-        "absorbed": ranking.separability.absorbed,
+        "absorbed": [c for c in ranking.separability.absorbed if c not in diagnosis.as_consumption],
+        "onsets": diagnosis.onsets_of(diagnosis.best) if diagnosis.best else {},
         "sizes": lambda cause: sizes_text(diagnosis, cause),
         "equations": lambda component: equations_of(diagnosis.localisation, component),
     }

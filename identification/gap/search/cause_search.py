@@ -142,7 +142,7 @@ class HypothesisPool:
             starts = []
             for each in chosen:
                 base, causes = each.estimate, each.estimate.hypothesis.causes
-                runs = _most_misfitting(self.problem, each.residuals)
+                runs = _most_misfitting(self.problem, dict(enumerate(each.residuals)))
                 found = law_starts(self.problem, base, [base] * len(causes), causes, runs)
                 starts += [start.estimate for start in found[:1]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)

@@ -1,52 +1,164 @@
-"""From which part of the recordings on a single cause acts, by linear prediction.
+"""In which part of the recordings a single cause acts, by linear prediction.
 
-A cause changes the runs before its onset not at all, and those after it in proportion to its signature.
-So one simulation of each cause serves every onset.
+A cause changes the runs outside its span not at all, and those within it in proportion to its signature.
+So one simulation of each cause serves every span.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import softmax
 
 from identification.gap.fit.variable_projection import LinearisedRun, eliminated, normal_equations
+from identification.gap.search.posterior import log_likelihoods, tolerated_misfit
 from identification.gap.search.screening import CauseSignature, with_changes
 
+KINDS = {"whole": 0.5, "late": 0.4, "mended": 0.1}
+"""Probability before the data that a cause acts in all drives, from a later one on, or ends [1]."""
 
-def least_squares_by_onset(
-    runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature], parts: NDArray
+
+@dataclass(frozen=True)
+class Onset:
+    """Drives of an operation log in which a cause acts, where these are not all."""
+
+    drive: str
+    """File of the first one."""
+    probability: float
+    """That the cause begins and ends there, if it acts at all."""
+    mended: str | None
+    """File of the first drive after them; None where it acts to the end."""
+
+
+@dataclass(frozen=True)
+class Span:
+    """Drives in which a cause acts."""
+
+    first: int
+    """Number of the first drive, from 0."""
+    end: int
+    """Number of the first drive after it."""
+    probability: float
+    """That it begins and ends there, if the cause acts at all."""
+    whole: bool
+    """Whether these are all drives of the log."""
+
+    def onset(self, drives: Sequence[str]) -> Onset | None:
+        """In words; None where the cause acts in all drives."""
+        mended = drives[self.end] if self.end < len(drives) else None
+        return None if self.whole else Onset(drives[self.first], self.probability, mended)
+
+
+def spans_of_causes(
+    runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    drives: NDArray,
+    count: int,
+    readings: int,
+    lasting: Collection[str] = (),
+) -> dict[str, Span]:
+    """The most probable drives of each cause by its label, by linear prediction.
+
+    Each cause alone; where the best one leaves more than the tolerated misfit, those that are worse by
+    more than that beside it: alone they do not count.
+
+    Args:
+        runs: the model without a cause, linearised.
+        signatures: of the causes beside it.
+        drives: number of each run's drive, (runs,).
+        count: of drives.
+        readings: how many the runs have.
+        lasting: labels of causes that act in all drives.
+    """
+    spans = [s for s in combinations(range(count + 1), 2) if np.any(in_span(drives, *s))]
+    acting = np.array([in_span(drives, *span) for span in spans])
+    excluded = np.outer([s.cause.label in lasting for s in signatures], [s != (0, count) for s in spans])
+    squares = np.where(excluded, np.inf, least_squares_by_span(runs, signatures, acting))
+    first, at = np.unravel_index(np.argmin(squares), squares.shape)
+    found = _likeliest(signatures, squares, spans, count, readings)
+    tolerated = 2.0 * tolerated_misfit(readings)
+    if np.min(squares) > readings + tolerated:
+        beside = least_squares_by_span(runs, signatures, acting, (signatures[first], acting[at]))
+        beside = np.where(excluded, np.inf, beside)
+        second = _likeliest(signatures, beside, spans, count, readings)
+        least = np.min(squares, axis=1)
+        near = {
+            s.cause.label
+            for s, own in zip(signatures, least, strict=True)
+            if own <= np.min(least) + tolerated
+        }
+        found = second | {label: found[label] for label in near}
+    return found
+
+
+def in_span(drives: NDArray, first: int, end: int) -> NDArray:
+    """Whether drives by number lie in a span, boolean, shaped as `drives`."""
+    return (drives >= first) & (drives < end)
+
+
+def _likeliest(
+    signatures: Sequence[CauseSignature],
+    squares: NDArray,
+    spans: Sequence[tuple[int, int]],
+    count: int,
+    readings: int,
+) -> dict[str, Span]:
+    """The likeliest span of each cause; squares: (signatures, spans), count: of drives."""
+    labels = [signature.cause.label for signature in signatures]
+    kinds = ["whole" if s == (0, count) else "late" if s[1] == count else "mended" for s in spans]
+    prior = np.array([np.log(KINDS[kind] / kinds.count(kind)) for kind in kinds])
+    likeliest = {}
+    for label in dict.fromkeys(labels):
+        least = np.min(squares[[name == label for name in labels]], axis=0)
+        misfits = (least / np.min(least) - 1.0) * readings / 2.0
+        chances = softmax(log_likelihoods(misfits, readings) + prior)
+        best = int(np.argmax(chances))
+        likeliest[label] = Span(*spans[best], float(chances[best]), kinds[best] == "whole")
+    return likeliest
+
+
+def least_squares_by_span(
+    runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    spans: NDArray,
+    beside: tuple[CauseSignature, NDArray] | None = None,
 ) -> NDArray:
-    """Sum of squares that the best single cause leaves if it acts from a part on, (parts,) [1].
+    """Sum of squares that each cause leaves if it acts in one span only, (signatures, spans) [1].
 
     Args:
         runs: the model without a cause, linearised.
         signatures: of the causes beside it, in the same runs.
-        parts: number of the part that each run belongs to, (runs,).
+        spans: whether a run lies in each, boolean (spans, runs).
+        beside: another cause that acts, too, of any size, and where: boolean (runs,).
     """
-    joint = [
-        with_changes(run, [signature.changes[r] for signature in signatures])
-        for r, run in enumerate(runs)
-    ]
+    further = [beside[0]] if beside else []
+    changes = [signature.changes for signature in (*signatures, *further)]
+    joint = [with_changes(run, [change[r] for change in changes]) for r, run in enumerate(runs)]
     grams = normal_equations(joint).runs.free()
-    first = 1 + runs[0].slopes.shape[1]
-    causes = np.arange(first, first + len(signatures))
+    causes = 1 + runs[0].slopes.shape[1] + np.arange(len(signatures))
+    others = np.setdiff1d(np.arange(1, grams.shape[1]), causes)
+    shared = np.arange(causes[-1] + 1 + len(further), grams.shape[1])
     shares = np.array([signature.shares for signature in signatures])
-    return np.array([_least(grams, causes, parts >= part, shares) for part in range(parts.max() + 1)])
+    weights = np.ones(grams.shape[:2])
+    if beside:
+        weights[:, causes[-1] + 1] = beside[1]
+    left = np.empty((len(signatures), len(spans)))
+    for number, acting in enumerate(spans):
+        weights[:, causes] = acting[:, None]
+        gram = np.sum(grams * weights[:, :, None] * weights[:, None], axis=0)
+        gram[shared, shared] += 1.0
+        left[:, number] = _least(eliminated(gram, others, np.array([0, *causes])), shares)
+    return left
 
 
-def _least(grams: NDArray, causes: NDArray, acting: NDArray, shares: NDArray) -> float:
-    """Sum of squares with the best cause in the runs `acting`, (runs,).
+def _least(gram: NDArray, shares: NDArray) -> NDArray:
+    """Sum of squares with each cause alone, (causes,).
 
-    grams: of residual, slopes, causes and shared nuisances, per run. causes: their places. shares: least
-    and largest multiple of each signature.
+    gram: of residual and causes. shares: least and largest multiple of each signature, (causes, 2).
     """
-    gram, late = np.sum(grams, axis=0), np.sum(grams[acting], axis=0)
-    gram[causes], gram[:, causes] = late[causes], late[:, causes]
-    shared = np.arange(causes[-1] + 1, len(gram))
-    gram[shared, shared] += 1.0
-    others = np.concatenate([np.arange(1, causes[0]), shared])
-    left = eliminated(gram, others, np.array([0, *causes]))
-    curvature = np.maximum(np.diag(left)[1:], np.finfo(float).tiny)
-    slope = left[0, 1:]
+    curvature = np.maximum(np.diag(gram)[1:], np.finfo(float).tiny)
+    slope = gram[0, 1:]
     share = np.clip(slope / curvature, *shares.T)
-    return float(np.min(left[0, 0] - 2.0 * share * slope + share**2 * curvature))
+    return gram[0, 0] - 2.0 * share * slope + share**2 * curvature

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from docs.examples.tank import NOISE, Tank, virtual_recordings
+from identification.gap.fit.evidence import percentage_errors, predict
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit
-from identification.gap.fit.prediction import percentage_errors, predict
 from identification.gap.fit.recalibration import recalibrate
 from identification.gap.judge.held_out import (
     DiscrepancyReduction,

@@ -175,6 +175,6 @@ def test_an_interval_is_as_wide_as_what_remains_is_large_and_correlated():
     assert inflation > 10
     form = covariance - inflation * hypothesis.covariance
     size = hypothesis.estimate.hypothesis.parameters[0]
-    acting = hypothesis.estimate.cause_vector[0] * size.scale
+    acting = hypothesis.estimate.vector[hypothesis.estimate.cause_start] * size.scale
     share = SYSTEMATIC_FORM_ERROR
     np.testing.assert_allclose(np.diag(form), [0.0, (share * acting) ** 2], atol=1e-12)

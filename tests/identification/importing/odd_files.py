@@ -99,6 +99,70 @@ def simulink(true: Recording) -> dict[str, Any]:
     return {"out": {"time": true.time, "signals": np.array(signals, dtype=kind)}}
 
 
+def timed(at: Path, true: Recording, time: Any, *, sep: str = ";", decimal: str = ".") -> Path:
+    """A text table whose first columns are times as some tool writes them."""
+    table = frame(true, true.time).drop(columns="time")
+    columns = time if isinstance(time, dict) else {"time": time}
+    text = pd.DataFrame(columns).join(table).to_csv(index=False, sep=sep, decimal=decimal)
+    return written(at.with_suffix(".csv"), text)
+
+
+def clock(true: Recording, form: str, begin: str = "2026-03-01T23:59:59.9") -> list[str]:
+    """Points in time in a form of strftime, with a fraction of six digits."""
+    return [f"{t:{form}}" for t in pd.date_range(begin, periods=len(true), freq=f"{true.period}s")]
+
+
+def multi(at: Path, true: Recording, begin: str = "Time" + 5 * "\t10:00:00.0") -> Path:
+    """LabVIEW's X_Columns Multi: a column of times before each channel."""
+    head = ["X_Columns\tMulti", "***End_of_Header***", "Date" + 5 * "\t2026/03/01",
+            begin, "\t".join(["Y_Unit_Label", *UNITS[1:]]),
+            "\t".join(f"X_Value\t{name}" for name in NAMES[1:]) + "\tComment"]  # fmt: skip
+    values = np.transpose([v for name in NAMES[1:] for v in (true.time, columns_of(true)[name][0])])
+    lines = ["\t".join(f"{value:.6f}" for value in row) for row in values]
+    return written(at.with_suffix(".lvm"), "\n".join([*head, *lines, ""]))
+
+
+def words(at: Path, true: Recording) -> Path:
+    """Some cells hold a word for a missing reading, and some rows a decimal comma among points."""
+    lines = rows(at.with_suffix(".csv"), true, [BRACKETED]).read_text().splitlines()
+    for k, word in enumerate(["NaN", "NULL", "#NV", "---", "Inf", ""]):
+        cells = lines[20 + 40 * k].split(";")
+        lines[20 + 40 * k] = ";".join([*cells[:3], word, *cells[4:]])  # p1, which is steady
+        lines[21 + 40 * k] = lines[21 + 40 * k].replace(".", ",")
+    return written(at.with_suffix(".csv"), "\n".join([*lines, ""]))
+
+
+def restarted(at: Path, true: Recording) -> Path:
+    return timed(at, true, {"time [s]": np.where(true.time < 0.3, true.time, true.time - 0.3)})
+
+
+def wrapped(at: Path, true: Recording) -> Path:
+    """A counter of ms that begins again after 65,535, and a stamp that was lost."""
+    count = (65_300 + 1e3 * true.time) % 65_536
+    return timed(at, true, {"t [ms]": np.where(np.arange(len(true)) == 100, 0.0, count)})
+
+
+def nanoseconds(at: Path, true: Recording) -> Path:
+    """MDF with unsigned integers of nanoseconds and a linear conversion to seconds as times."""
+    from asammdf import MDF, Signal
+
+    conversion = {"a": 1e-9, "b": 0.0}
+    count = np.round(1e9 * true.time).astype("u8") + 1_772_359_200_000_000_000
+    signals = [
+        Signal(
+            samples=count if name == "time" else values,
+            timestamps=true.time,
+            name=f"{name}_",
+            unit=unit,
+            conversion=conversion if name == "time" else None,
+        )
+        for name, (values, unit) in columns_of(true).items()
+    ]
+    with MDF(version="4.10") as file:
+        file.append(signals)
+        return Path(file.save(at.with_suffix(".mf4"), overwrite=True))
+
+
 READ: dict[str, Callable[[Path, Recording], Path]] = {
     "LabVIEW text with a column of comments": lvm,
     "names, types and units in three rows": three_header_rows,
@@ -109,7 +173,7 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
         at.with_suffix(".csv"), r, [BRACKETED + ";"]
     ),
     "units in brackets twice": lambda at, r: rows(
-        at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar(a)")]
+        at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar[a]").replace("bar[a]", "bar(a)", 1)]
     ),
     "units of gauge pressure with a dot": lambda at, r: text(
         at.with_suffix(".csv"),
@@ -124,6 +188,27 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
     "MATLAB, array of structs": lambda at, r: mat5(at, struct_array(r)),
     "MATLAB, start and interval": lambda at, r: mat5(at, interval(r)),
     "MATLAB, structure with time": lambda at, r: mat5(at, simulink(r)),
+    "LabVIEW text with a column of times for each channel": multi,
+    "date and time of day in two columns": lambda at, r: timed(
+        at, r, {"Datum": clock(r, "%d.%m.%Y"), "Zeit": clock(r, "%H:%M:%S,%f")}, decimal=","
+    ),
+    "German dates": lambda at, r: timed(at, r, clock(r, "%d.%m.%Y %H:%M:%S.%f")),
+    "American dates": lambda at, r: timed(at, r, clock(r, "%m/%d/%Y %I:%M:%S.%f %p"), sep=","),
+    "times of day past midnight": lambda at, r: timed(at, r, clock(r, "%H:%M:%S.%f"), sep="\t"),
+    "words for missing readings": words,
+    "five header rows": lambda at, r: rows(
+        at.with_suffix(".csv"),
+        r,
+        [
+            "Trace;;;;;",
+            ";".join(["Time", *NAMES[1:]]),
+            5 * "REAL;" + "REAL",
+            ";".join(UNITS),
+            "DT0;DT2;DT4;DT6;DT8;DT10",
+        ],
+    ),
+    "a counter that wraps": wrapped,
+    "nanoseconds with a conversion": nanoseconds,
 }
 
 
@@ -193,14 +278,6 @@ def coarse(at: Path, true: Recording) -> Path:
     return text(at.with_suffix(".csv"), {**columns_of(true), "time": (np.round(true.time, 3), "s")})
 
 
-def times_of_day(at: Path, true: Recording) -> Path:
-    head, *lines = rows(at.with_suffix(".csv"), true, ["Date;" + BRACKETED]).read_text().splitlines()
-    return written(
-        at.with_suffix(".csv"),
-        "\n".join([head, *(f"01.03.2026;10:00:0{line}" for line in lines if line)]).replace(".", ","),
-    )
-
-
 REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
     "a cut last line": (
         lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="0.65;0.44;18.9"),
@@ -210,11 +287,10 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
         lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="\nstopped by operator\n"),
         r"line \d+ has not the 6 numbers of the lines above: delete it",
     ),
-    "LabVIEW text with several columns of times": (
-        lambda at, r: rows(at.with_suffix(".lvm"), r, ["X_Value\tI\tX_Value\tp1\tp2\tp3"], sep="\t"),
-        "'X_Value' stands 2 times: write it with one column of times",
+    "a record that begins again": (
+        restarted,
+        "time does not increase after .*: cut the recording there",
     ),
-    "times of day in a column": (times_of_day, "times of day .*: put date and time into one column"),
     "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
     "a text called MDF": (
         lambda at, r: written(at.with_suffix(".mf4"), "a text"),
@@ -233,6 +309,10 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
     "a name without end": (
         lambda at, r: table(at, ["time", "a" + " " * 10_000 + "b"]),
         f"more than {LONGEST_NAME} characters: shorten it",
+    ),
+    "LabVIEW's channels that begin apart": (
+        lambda at, r: multi(at, r, "Time\t10:00:00.0\t10:00:00.5"),
+        "begin at different times of day",
     ),
     "a MATLAB file of texts": (
         lambda at, r: mat5(at, {"a": np.array(["text"], dtype=object)}),

@@ -9,7 +9,8 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.importing.import_campaign import import_text, read_files
-from identification.importing.source_file import ImportingError, points_in_time, seconds
+from identification.importing.source_file import ImportingError
+from identification.importing.times import points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CHANNELS
 from tests.identification.importing.dialects import columns_of, text

@@ -198,9 +198,9 @@ MANIFESTS = [  # damage, message
     (entry(role="test"), "recording 2: unknown role 'test': choose one of calibration, valid"),
     (entry(file="./test1.csv"), "recording 2: test1.csv is named twice, .*: name each file once"),
     (entry(file="sub/test1.csv"), "recording 2: test1.csv is named twice, .*once, and rename"),
-    (entry(file="../test1.csv"), "recording 2: file '../test1.csv' leaves the campaign's folder: "),
-    (entry(file="a\0.csv"), "recording 2: file .* leaves the campaign's folder: copy it there"),
-    (linked, "recording 1: file 'test1.csv' leaves the campaign's folder: copy it there"),
+    (entry(file="../test1.csv"), "recording 2: file '../test1.csv' leaves the folder: "),
+    (entry(file="a\0.csv"), "recording 2: file .* leaves the folder: copy it there"),
+    (linked, "recording 1: file 'test1.csv' leaves the folder: copy it there"),
 ]  # fmt: skip
 
 
@@ -271,7 +271,7 @@ def renamed(name: str):
     [
         (campaign_of(), "recordings is empty"),
         (campaign_of(switching(), switching()), "recording 2: test1.csv is named twice"),
-        (campaign_of(renamed("../test1")), "leaves the campaign's folder"),
+        (campaign_of(renamed("../test1")), "leaves the folder"),
         (campaign_of(renamed("sub/test1")), "'sub/test1' does not name a file: give it a name without"),
         (campaign_of(renamed("")), "'' does not name a file"),
         (campaign_of(replace(switching(), role="test")), "unknown role 'test'"),

@@ -3,6 +3,8 @@
 import json
 import re
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import gymnasium
 import numpy as np
@@ -15,8 +17,10 @@ from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
 from epv_env.signals import OptionError
 from identification.__main__ import main
-from identification.recordings.log_files import read_log
-from identification.recordings.openings import drive_of, openings, start_of
+from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.search.onset import Onset, Span, in_span, spans_of_causes
+from identification.recordings.log_files import Drive, Log, read_log
+from identification.recordings.openings import drive_of, openings, pauses, start_of
 from identification.recordings.recording import CampaignError
 from identification.valve_gap.operation import LoggedValve, steady_openings
 from training.drives import write_log
@@ -63,7 +67,7 @@ def test_a_cause_acts_from_its_drive_on(healthy):
     log = read_log(healthy)
     campaign, steady = steady_openings(log, PLANT)
     whole = LoggedValve(campaign, PLANT, steady)
-    late = whole.since(1)
+    late = whole.acting_in({c.label: Span(1, 2, 1.0, False) for c in whole.causes})
     runs = range(len(whole.runs))
     acting = {"G_eddy": np.array([0.004])}
     none, every, second = (
@@ -73,6 +77,54 @@ def test_a_cause_acts_from_its_drive_on(healthy):
     for run, without, both, one in zip(whole.runs, none, every, second, strict=True):
         np.testing.assert_array_equal(one, both if run.name.startswith("drive-2") else without)
         assert np.any(both != without)
+
+
+def test_each_cause_has_its_drives_also_beside_another_one():
+    """The first acts in drives 1 and 2 and is mended; the second, smaller one begins in drive 2."""
+    rng, drives = np.random.default_rng(0), np.repeat(np.arange(4), 3)
+    true, sizes = {"first": (1, 3), "second": (2, 4), "third": (0, 4)}, {"first": 3.0, "second": 1.0}
+    signatures: Any = [
+        SimpleNamespace(
+            cause=SimpleNamespace(label=label), changes=list(rng.normal(size=(12, 40))), shares=(-9, 9)
+        )
+        for label in true
+    ]
+    runs = []
+    for r, drive_number in enumerate(drives):
+        residual = rng.normal(size=40)
+        for signature in signatures:
+            label = signature.cause.label
+            size = sizes.get(label, 0.0) * in_span(drive_number, *true[label])
+            residual += size * signature.changes[r]
+        none = np.zeros((40, 0))
+        runs.append(
+            LinearisedRun(
+                residual=residual, slopes=np.ones((40, 1)), slope_precision=np.zeros(1),
+                slope_values=np.zeros(1), run_slopes=none, run_values=np.zeros(0), run_sd=np.zeros(0),
+                shared_slopes=none,
+            )
+        )  # fmt: skip
+    spans = spans_of_causes(runs, signatures, drives, 4, 480)
+    for label in sizes:
+        assert (spans[label].first, spans[label].end) == true[label]
+        assert spans[label].probability > 0.9
+    assert spans["first"].onset(["a", "b", "c", "d"]) == Onset("b", spans["first"].probability, "d")
+
+
+@pytest.mark.parametrize(("grams", "count"), [(0.0, 4), (-0.3, 4), (0.3, 0)])
+def test_nothing_is_consumed_where_consumption_is_lowest_and_not_above_zero(grams, count):
+    rng, time = np.random.default_rng(0), 0.005 * np.arange(2000)
+    p = PLANT.parameters
+    slope = -grams * GRAM * p["R_gas"] * 293.0 / p["V2"]
+    steady = {name: 11e5 + 1e3 * rng.normal(size=2000) for name in ("p1", "p3")}
+    drive = Drive(
+        file="drive-1.csv", coil=np.ones(2000), U=np.full(2000, 24.0), I=np.full(2000, 0.5),
+        p2=7e5 + slope * time + 1e3 * rng.normal(size=2000), target=np.full(2000, 7e5), **steady,
+    )  # fmt: skip
+    log = Log(name="", temperature=293.0, pressure=1e5, period=0.005, drives=(drive,))
+    resting = pauses(log, p)
+    assert len(resting) == count
+    assert all(np.all(recording.sigma_S == 0.0) for recording in resting)
 
 
 def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
@@ -93,7 +145,9 @@ def test_cause_and_onset_are_found(tmp_path):
     assert main(["gap", str(folder), "--logs", "--out", str(tmp_path / "out")]) == 0
     content = json.loads((tmp_path / "out" / "gap.json").read_text())
     assert content["causes"][0]["effects"] == ["eddy_current"]
+    assert content["onset"] == content["causes"][0]["onset"]["eddy_current"]
     assert content["onset"]["drive"] == "drive-2.csv"
+    assert content["onset"]["mended"] is None
     assert content["onset"]["probability"] > 0.9
 
 
@@ -107,7 +161,7 @@ def test_a_log_is_refused_in_a_sentence(healthy, tmp_path):
     with pytest.raises(OptionError, match="holds files already"):
         OperationLog(gymnasium.make("EPValve-v0"), healthy)
     for change, told in [
-        (lambda text: text.replace(",target_bar", ",goal"), "target_bar stands 0 times"),
+        (lambda text: text.replace(",target_bar", ",goal"), "missing target_bar"),
         (lambda text: text.replace("0.005000,", "0.004000,", 1), "time"),
         (lambda text: re.sub(r"\n0.000000,\d,", "\n0.000000,2,", text), "coil is 2"),
     ]:
@@ -177,7 +231,7 @@ def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tm
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        ({"drives": [{"file": "drive-1.csv"}] * 2}, "drives names drive-1.csv twice"),
+        ({"drives": [{"file": "drive-1.csv"}] * 2}, "drive 2: drive-1.csv is named twice"),
         ({"control_period_s": 0.0}, "states a control period of 0 s"),
         ({"environment": {"temperature_K": 0.0, "pressure_bar": 1.0}}, "temperature_K is 0.0"),
     ],

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.gap.fit import prediction
+from identification.gap.fit import evidence
 from identification.gap.fit.fitting_problem import FittingProblem, Hypothesis
 from identification.gap.prepare.prepared_plant import prepared
 from identification.valve_gap.valve import Valve
@@ -25,7 +25,7 @@ def found() -> np.ndarray:
     plant.runs = tuple(replace(run, measured=y[..., 0]) for run, y in zip(plant.runs, read, strict=True))
     problem = FittingProblem(plant)
     cold = problem.start(Hypothesis(causes=(heating,)), {"h_coil": H_COIL})
-    return start.centre + prediction.with_settled_runs(problem, cold).run_values[:, 0]
+    return start.centre + evidence.with_settled_runs(problem, cold).run_values[:, 0]
 
 
 def test_every_run_finds_its_own_warmth():

@@ -12,8 +12,8 @@ from identification.bench.programmes import DIAGNOSIS_SUITE
 from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import calibration_problem
 from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.fit.evidence import percentage_errors
 from identification.gap.fit.laws import KNOTS
-from identification.gap.fit.prediction import percentage_errors
 from identification.recordings.recording import OUTPUTS, Campaign
 from identification.replay.replay import responses, total_response_error
 from identification.validation import validate

@@ -6,6 +6,7 @@ import shutil
 import numpy as np
 import pytest
 
+from epv_env.plant.channels import readings
 from epv_env.plant.effects.law import placed
 from epv_env.plant.effects.registry import CATALOGUE, EFFECTS, PLACES
 from epv_env.plant.parameters import Parameters, table
@@ -76,7 +77,7 @@ def test_ten_thousand_random_steps_are_the_kernels(unit):
         flow = np.where(valves.state.p2 > 3e5, rng.choice([0.0, 0.005, 0.015], VALVES), 0.0)
         valves.inputs.U[:], valves.inputs.sigma_S[:] = U, flow
         valves.advance(PERIOD)
-        shown = valves.readings()
+        shown = readings(valves.state, valves.tables.sensors[:VALVES])
         for k, instance in enumerate(instances):
             assert instance.step(PERIOD, U=U[k], sigma_S=flow[k]) == OK, instance.said
         found = np.array([instance.get(*OUTPUTS) for instance in instances])
@@ -103,7 +104,8 @@ def test_laws_act_as_in_the_kernel(unit):
         valves.inputs.U[:] = U
         valves.advance(PERIOD)
         assert law.step(PERIOD, U=U) == plain.step(PERIOD, U=U) == OK
-        wanted = np.array([valves.readings()[name][0] for name in OUTPUTS])
+        shown = readings(valves.state, valves.tables.sensors[:1])
+        wanted = np.array([shown[name][0] for name in OUTPUTS])
         assert np.all(np.abs(np.array(law.get(*OUTPUTS)) - wanted) < [0.1, 0.1, 0.1, 1e-6])
         felt = np.maximum(felt, np.abs(np.array(plain.get(*OUTPUTS)) - wanted))
     assert felt[1] > 1e3
@@ -131,14 +133,20 @@ def test_all_states_come_out(unit):
         np.testing.assert_allclose(found, value[0], rtol=1e-3, atol=1e-9, err_msg=name)
 
 
-def test_the_length_of_steps_matters_little(unit):
-    long, short = (started(unit, Parameters.calibrated()) for _ in range(2))
+@pytest.mark.parametrize("longest", [20e-3, 5e-3, 1e-3, 0.7e-3])
+def test_the_length_of_steps_matters_little(unit, longest):
+    """U is discrete: an importer ends its steps at the edges, which therefore stay where they are."""
+    (U,) = (v for v in unit.description.iter("ScalarVariable") if v.attrib["name"] == "U")
+    assert U.attrib["variability"] == "discrete"
+    whole, parts = (started(unit, Parameters.calibrated(), U=0.0) for _ in range(2))
     for k in range(10):
-        U = 24.0 * (k % 2)
-        assert long.step(10e-3, U=U) == OK
-        for step in (0.3e-3, 4.2e-3, 1e-3, 4.5e-3):
-            assert short.step(step, U=U) == OK
-    np.testing.assert_allclose(long.get(*OUTPUTS[:3]), short.get(*OUTPUTS[:3]), atol=TENTH_OF_A_MILLIBAR)
+        inputs = {"U": 24.0 * (k % 2)} if k else {}  # the start value of U stays until it is set
+        assert whole.step(35e-3, **inputs) == OK
+        for step in np.diff([*np.arange(0.0, 35e-3 - 1e-9, longest), 35e-3]):
+            assert parts.step(step, **inputs) == OK
+    np.testing.assert_allclose(
+        whole.get(*OUTPUTS[:3]), parts.get(*OUTPUTS[:3]), atol=TENTH_OF_A_MILLIBAR
+    )
 
 
 @pytest.mark.parametrize("name", list(CATALOGUE))
@@ -159,6 +167,7 @@ def test_a_parameter_counts_if_it_is_set_in_time(unit):
     instance = Instance(unit).start({"R": 50.0})
     assert instance.step(QUICK, U=24.0) == OK
     assert instance.get("I") == pytest.approx([24 / 50])
+    assert instance.set({"R": 50.0}) == OK  # its own value: nothing changes
     assert instance.set({"R": 40.0}) == ERROR
     assert instance.said == [
         "parameter R cannot be set while it runs: set it before initialisation ends"

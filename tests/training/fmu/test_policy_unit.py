@@ -1,5 +1,6 @@
 """The FMU of an exported policy decides as the policy, and closes the loop with the plant's FMU."""
 
+import ctypes
 import shutil
 from pathlib import Path
 
@@ -102,3 +103,14 @@ def test_a_state_saved_while_readings_are_lost_goes_on_the_same(ecu, unit):
     assert found[0] == found[1]
     assert found[0][2:20] == [1.0] * 18  # the fourth lost period, and the later ones
     assert found[0][-1] == 0.0  # p2 is back, and low: the hysteresis opens
+
+
+def test_summed_steps_do_not_drift(unit):
+    """The plain sum of steps of 0.1 ms is 1e-9 s off after 64 s: a decision came a step early."""
+    instance, time, step = Instance(unit).start(), 0.0, ctypes.c_double(1e-4)
+    advance, handle = unit.function("DoStep"), ctypes.c_void_p(instance.handle)
+    for _ in range(700_000):
+        assert advance(handle, ctypes.c_double(time), step, True) == OK
+        time += 1e-4
+    (decisions,) = np.frombuffer(instance.bytes_of(instance.saved())[-40:-32])  # before phase and times
+    assert decisions == 70 / PERIOD

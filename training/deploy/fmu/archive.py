@@ -26,8 +26,14 @@ FOLDERS = {"linux": "linux", "darwin": "darwin", "windows": "win"}
 """Folder of binaries, before the number of bits."""
 LONG_AGO = (1980, 1, 1, 0, 0, 0)
 """Date of every file in the archive: the same model gives the same archive."""
-CAUSALITY = {"time": "independent"}
-"""What the standard calls a kind of variable where it has another word."""
+KINDS = {
+    "input": {"causality": "input", "variability": "continuous"},
+    "parameter": {"causality": "parameter", "variability": "fixed", "initial": "exact"},
+    "output": {"causality": "output", "variability": "continuous", "initial": "calculated"},
+    "local": {"causality": "local", "variability": "continuous", "initial": "calculated"},
+    "time": {"causality": "independent", "variability": "continuous"},
+}
+"""What the standard says of a kind of variable."""
 
 BASE = {
     "kg": {"kg": 1}, "m": {"m": 1}, "s": {"s": 1}, "A": {"A": 1}, "K": {"K": 1}, "rad": {"rad": 1},
@@ -71,17 +77,7 @@ class Variable:
     high: float = math.inf
     """Greatest value of an input or parameter [unit]."""
     discrete: bool = False
-    """Whether an output changes at instants only."""
-
-    @property
-    def settable(self) -> bool:
-        """Whether an importer gives its value."""
-        return self.kind in ("input", "parameter")
-
-    @property
-    def in_c(self) -> str:
-        """Name of its value reference in C."""
-        return f"V_{self.name.replace('.', '_')}"
+    """Whether it changes at instants only: importers then hold it, and end steps at its edges."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -103,10 +99,6 @@ class Model:
     stop: float = 1.0
     """Length of a simulation that shows what the model does [s]."""
 
-    def of_kind(self, *kinds: Kind) -> list[Variable]:
-        """Its variables of these kinds, in order."""
-        return [variable for variable in self.variables if variable.kind in kinds]
-
 
 def base_units(unit: str) -> dict[str, int]:
     """Powers of the base units of a unit such as `V s/(A m)`. Raises UnitError for an unknown one."""
@@ -126,41 +118,24 @@ def model_description(model: Model) -> bytes:
     """modelDescription.xml of a model. Raises UnitError."""
     root = xml.Element(
         "fmiModelDescription",
-        {
-            "fmiVersion": "2.0",
-            "modelName": model.name,
-            "guid": token(model),
-            "description": model.description,
-            "generationTool": "epv-valve",
-            "license": "MIT",
-            "variableNamingConvention": "structured",
-        },
+        fmiVersion="2.0",
+        modelName=model.name,
+        guid=token(model),
+        description=model.description,
+        generationTool="epv-valve",
+        license="MIT",
+        variableNamingConvention="structured",
     )
     unit = xml.SubElement(
         root,
         "CoSimulation",
-        {
-            "modelIdentifier": model.identifier,
-            "canHandleVariableCommunicationStepSize": "true",
-            "canGetAndSetFMUstate": "true",
-            "canSerializeFMUstate": "true",
-        },
+        modelIdentifier=model.identifier,
+        canHandleVariableCommunicationStepSize="true",
+        canGetAndSetFMUstate="true",
+        canSerializeFMUstate="true",
     )
     xml.SubElement(xml.SubElement(unit, "SourceFiles"), "File", name=MAIN)
-    _units(xml.SubElement(root, "UnitDefinitions"), model)
-    xml.SubElement(xml.SubElement(root, "LogCategories"), "Category", name="logStatusError")
-    experiment = {"startTime": "0.0", "stopTime": repr(model.stop), "stepSize": repr(model.step)}
-    xml.SubElement(root, "DefaultExperiment", experiment)
-    variables = xml.SubElement(root, "ModelVariables")
-    for reference, variable in enumerate(model.variables):
-        _scalar_variable(variables, variable, reference)
-    _structure(xml.SubElement(root, "ModelStructure"), model)
-    xml.indent(root)
-    return xml.tostring(root, encoding="UTF-8", xml_declaration=True)
-
-
-def _units(definitions: xml.Element, model: Model) -> None:
-    """Every unit that a variable has, as powers of the base units."""
+    definitions = xml.SubElement(root, "UnitDefinitions")
     for name in sorted({variable.unit for variable in model.variables} - {"1"}):
         unit = xml.SubElement(definitions, "Unit", name=name)
         powers = {base: str(power) for base, power in base_units(name).items()}
@@ -168,52 +143,59 @@ def _units(definitions: xml.Element, model: Model) -> None:
         if name in DISPLAY:
             shown, factor = DISPLAY[name]
             xml.SubElement(unit, "DisplayUnit", name=shown, factor=repr(factor))
+    xml.SubElement(xml.SubElement(root, "LogCategories"), "Category", name="logStatusError")
+    experiment = {"startTime": "0.0", "stopTime": repr(model.stop), "stepSize": repr(model.step)}
+    xml.SubElement(root, "DefaultExperiment", experiment)
+    variables = xml.SubElement(root, "ModelVariables")
+    for reference, variable in enumerate(model.variables):
+        _scalar_variable(variables, variable, reference)
+    structure = xml.SubElement(root, "ModelStructure")
+    for name in ("Outputs", "InitialUnknowns"):  # they depend on all inputs; variables count from one
+        within = xml.SubElement(structure, name)
+        for number, variable in enumerate(model.variables, start=1):
+            if variable.kind == "output":
+                xml.SubElement(within, "Unknown", index=str(number))
+    xml.indent(root)
+    return xml.tostring(root, encoding="UTF-8", xml_declaration=True)
 
 
 def _scalar_variable(parent: xml.Element, variable: Variable, reference: int) -> None:
     """A variable, with its unit, range and start."""
-    fixed = {"parameter": "fixed", "output": "discrete" if variable.discrete else "continuous"}
     attributes = {
         "name": variable.name,
         "valueReference": str(reference),
         "description": variable.meaning,
-        "causality": CAUSALITY.get(variable.kind, variable.kind),
-        "variability": fixed.get(variable.kind, "continuous"),
+        **KINDS[variable.kind],
+        **({"variability": "discrete"} if variable.discrete else {}),
     }
-    initial = {"parameter": "exact", "output": "calculated", "local": "calculated"}.get(variable.kind)
-    element = xml.SubElement(
-        parent, "ScalarVariable", attributes | ({"initial": initial} if initial else {})
-    )
+    element = xml.SubElement(parent, "ScalarVariable", attributes)
     numbers = {} if variable.unit == "1" else {"unit": variable.unit}
     if variable.unit == "Pa":
         numbers["displayUnit"] = DISPLAY["Pa"][0]
     for name, value in (("min", variable.low), ("max", variable.high)):
         if math.isfinite(value):
             numbers[name] = repr(float(value))
-    start = {"start": repr(float(variable.start))} if variable.settable else {}
-    xml.SubElement(element, "Real", numbers | start)
-
-
-def _structure(structure: xml.Element, model: Model) -> None:
-    """The outputs, which all depend on the inputs; the standard counts variables from one."""
-    for name in ("Outputs", "InitialUnknowns"):
-        within = xml.SubElement(structure, name)
-        for number, variable in enumerate(model.variables, start=1):
-            if variable.kind == "output":
-                xml.SubElement(within, "Unknown", index=str(number))
+    if variable.kind in ("input", "parameter"):
+        numbers["start"] = repr(float(variable.start))
+    xml.SubElement(element, "Real", numbers)
 
 
 def fmu_sources(model: Model) -> dict[str, str]:
     """Text of the C files by name."""
+    references, rows = [], []
+    for variable in model.variables:
+        references.append(f"    V_{variable.name.replace('.', '_')},")
+        numbers = (variable.low, variable.high, variable.start)
+        text = ", ".join(repr(float(number)).replace("inf", "INFINITY") for number in numbers)
+        rows.append(f'    {{"{variable.name}", {variable.kind.upper()}, {text}}},')
     fields = {
         "title": model.name,
         "token": token(model),
-        "references": "\n".join(f"    {each.in_c}," for each in model.variables),
-        "table": "\n".join(_row(each) for each in model.variables),
+        "references": "\n".join(references),
+        "table": "\n".join(rows),
     }
-    return model.sources | {
-        name: filled(TEMPLATES / name, fields) for name in ("component.h", MAIN, "variables.h")
-    }
+    names = ("component.h", MAIN, "variables.h")
+    return model.sources | {name: filled(TEMPLATES / name, fields) for name in names}
 
 
 def token(model: Model) -> str:
@@ -222,20 +204,8 @@ def token(model: Model) -> str:
     return f"{{{uuid.uuid5(uuid.NAMESPACE_OID, digest)}}}"
 
 
-def _row(variable: Variable) -> str:
-    """A variable in C."""
-    numbers = (variable.low, variable.high, variable.start)
-    text = ", ".join(
-        repr(float(x)) if math.isfinite(x) else ("-" if x < 0 else "") + "INFINITY" for x in numbers
-    )
-    return f'    {{"{variable.name}", {variable.kind.upper()}, {text}}},'
-
-
-def binary(sources: dict[str, str], identifier: str, compiler: str) -> dict[str, bytes]:
-    """The shared library for this platform by its path in an FMU, empty without a compiler.
-
-    Raises ExportError where the compiler does not accept the code.
-    """
+def _binary(sources: dict[str, str], identifier: str, compiler: str) -> dict[str, bytes]:
+    """The shared library for this platform by its path in an FMU, empty without a compiler."""
     words = compiler_words(compiler)
     if not words:
         return {}
@@ -257,7 +227,7 @@ def fmu(model: Model, compiler: str) -> bytes:
     sources = fmu_sources(model)
     files = {f"sources/{name}": text.encode() for name, text in sources.items()}
     files["modelDescription.xml"] = model_description(model)
-    for name, content in binary(sources, model.identifier, compiler).items():
+    for name, content in _binary(sources, model.identifier, compiler).items():
         files[f"binaries/{name}"] = content
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:

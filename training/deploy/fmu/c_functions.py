@@ -55,7 +55,7 @@ class PlantC(Translation):
             for name, kind in zip(names, types, strict=True)
         ]
         result = python(*arguments)
-        kind = self.structures[type(result)]
+        kind = self.structure(type(result))
         members = ",\n        ".join(f".{each} = {written(v)}" for each, v in result._asdict().items())
         taken = {known.name for _, known in self.functions.values()}
         name = python.__name__ if python.__name__ not in taken else f"{python.__name__}_{len(taken)}"

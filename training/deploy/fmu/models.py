@@ -80,7 +80,7 @@ def _variables(plant: Plant) -> tuple[Variable, ...]:
         Variable(
             name=name, kind="input", unit=unit, meaning=meaning,
             start=U_START if name == "U" else 0.0,
-            low=0.0 if name in NOT_NEGATIVE else -float("inf"),
+            low=0.0 if name in NOT_NEGATIVE else -float("inf"), discrete=name == "U",
         )
         for name, (unit, meaning) in field_texts(Inputs).items()
     ]  # fmt: skip

@@ -6,15 +6,16 @@
 #include <math.h>
 #include <string.h>
 
-enum { N = EPV_FEATURES, H = EPV_SHIFTS, I0 = $before, LENGTH = EPV_ROWS };
+/* R: the return, which has no shift of its own. */
+enum { N = EPV_FEATURES, H = EPV_SHIFTS, R = H - 1, L = EPV_LINEAR, I0 = $before, LENGTH = EPV_ROWS };
 
 static const double CENTRE[$conditions] = $centre, SCALE[$conditions] = $scale;
 static const double WHITEN[N][N] = $whiten;
 static const double EXPECTED[N][$terms] = $expected;
 static const double KINKS[$kink_count] = $kinks;
 static const double OFFSET[N] = $offset;
-static const double SHIFT[H][N][$linear] = $shifts;
-static const double WEIGHT[H] = $weights, LATER[H] = $later;
+static const double SHIFT[R][N][L] = $shifts;
+static const double WEIGHT[H] = $weights, LATER[R] = $later;
 static const int EFFECT[H] = $effect;
 
 static double least(double a, double b) { return a < b ? a : b; }
@@ -26,17 +27,32 @@ static double sum_log(double a, double b) { return most(a, b) + log1p(exp(-fabs(
 /* off = -1: what came before the command is not known. */
 void epv_monitor_pause(epv_monitor *m) { m->on = 0, m->off = -1; }
 
-static void restart(epv_monitor *m) {
-    memset(m->mean, 0, sizeof m->mean);
+static double later(const epv_monitor *m, int h) { return h == R ? m->returns : LATER[h]; }
+
+/* Learn the state from here on. before: time in which an earlier change may be hidden [h]. */
+static void refer(epv_monitor *m, double before) {
     memset(m->learnt, 0, sizeof m->learnt);
-    memset(m->since, 0, sizeof m->since);
-    for (int k = 0; k < N; k++) m->variance[k] = OFFSET[k];
-    for (int h = 0; h < H; h++) m->log[h] = log(most($before_start * (1.0 - LATER[h]), $least));
     m->last = m->periods * $period;
+    m->alarms = 0;
+    for (int h = 0; h < H; h++) {
+        m->log[h] = log(most(h == R ? 0.0 : before * (1.0 - LATER[h]), $least));
+        m->since[h] = m->changes ? m->last : 0.0;
+    }
 }
 
-void epv_monitor_reset(epv_monitor *m) {
+static void restart(epv_monitor *m) {
+    memset(m->mean, 0, sizeof m->mean);
+    memset(m->before, 0, sizeof m->before);
+    memset(m->reference, 0, sizeof m->reference);
+    memset(m->back, 0, sizeof m->back);
+    m->returns = m->next = 0;
+    for (int k = 0; k < N; k++) m->variance[k] = OFFSET[k];
+    refer(m, $before_start);
+}
+
+void epv_monitor_reset(epv_monitor *m, double false_alarms_per_hour) {
     memset(m, 0, sizeof *m);
+    m->rate = false_alarms_per_hour;
     epv_monitor_pause(m);
     restart(m);
 }
@@ -91,24 +107,67 @@ static int features(const double (*r)[6], int rows, double *x, double *z) {
     return 1;
 }
 
+static double total(const epv_monitor *m) {
+    double sum = m->log[0] + log(WEIGHT[0]);
+    for (int h = 1; h < H; h++) sum = sum_log(sum, m->log[h] + log(WEIGHT[h]));
+    return sum;
+}
+
+static double dot(const double *a, const double *b, int n) {
+    double sum = 0.0;
+    for (int k = 0; k < n; k++) sum += a[k] * b[k];
+    return sum;
+}
+
+/* Median of the departures of feature k from the reference, over the openings of a settled alarm. */
+static double median(const epv_monitor *m, int k) {
+    double sorted[EPV_SETTLING];
+    for (int i = 0; i < EPV_SETTLING; i++) {
+        const double value = m->recent[i][k] - dot(m->reference[k], m->conditions[i], L);
+        int j = i;
+        for (; j > 0 && sorted[j - 1] > value; j--) sorted[j] = sorted[j - 1];
+        sorted[j] = value;
+    }
+    return (sorted[(EPV_SETTLING - 1) / 2] + sorted[EPV_SETTLING / 2]) / 2;
+}
+
+/* The present state becomes the reference; the latest change can be taken back from now on. */
+static void settle(epv_monitor *m) {
+    const double sum = total(m);
+    int best = 0;
+    m->onset = epv_monitor_causes(m, m->share);
+    for (int h = 1; h < H; h++) if (WEIGHT[h] * exp(m->log[h] - sum) > WEIGHT[best] * exp(m->log[best] - sum)) best = h;
+    for (int k = 0; k < N; k++) {
+        m->before[k] = m->mean[k];
+        for (int h = 0; h < H; h++) m->before[k] -= WEIGHT[h] * exp(m->log[h] - sum) * m->learnt[h][k];
+        for (int l = 0; l < L; l++) {
+            m->back[k][l] = best == R ? -m->back[k][l] : SHIFT[best][k][l];
+            m->reference[k][l] += m->back[k][l];
+        }
+        m->mean[k] = median(m, k);
+        m->variance[k] = $relearnt;
+    }
+    m->returns = 1;
+    m->changes += m->changes < UINT_MAX;
+    refer(m, 0.0);
+}
+
 static void observe(epv_monitor *m, const double *x, const double *z) {
     const double time = m->periods * $period, elapsed = (time - m->last) / 3600.0;
-    double found[N], spread[N];
+    double departure[N], found[N], spread[N];
     for (int k = 0; k < N; k++) {
         spread[k] = 1.0 + m->variance[k];
-        found[k] = 0.0;
-        for (int l = 0; l < N; l++) found[k] += WHITEN[k][l] * z[l];
-        for (int l = 0; l < $terms; l++) found[k] -= EXPECTED[k][l] * x[l];
-        if (!isfinite(found[k])) return; /* a reading was absurd: the opening does not count */
-        found[k] -= m->mean[k];
+        departure[k] = dot(WHITEN[k], z, N) - dot(EXPECTED[k], x, $terms);
+        if (!isfinite(departure[k])) return; /* a reading was absurd: the opening does not count */
+        found[k] = departure[k] - dot(m->reference[k], x, L) - m->mean[k];
     }
     for (int h = 0; h < H; h++) {
-        const double hours = LATER[h] * elapsed, prior = sum_log(m->log[h], log(most(hours, $least)));
+        const double hours = later(m, h) * elapsed, prior = sum_log(m->log[h], log(most(hours, $least)));
         const double begun = hours * exp(-prior);
         double ratio = 0.0;
         for (int k = 0; k < N; k++) {
-            double shift = -m->learnt[h][k];
-            for (int l = 0; l < $linear; l++) shift += SHIFT[h][k][l] * x[l];
+            const double shift = h == R ? m->returns * (m->before[k] - dot(m->back[k], x, L) - m->mean[k])
+                                        : dot(SHIFT[h][k], x, L) - m->learnt[h][k];
             const double limit = $clipped * sqrt(spread[k]), far = found[k] - shift;
             ratio += (least(found[k] * found[k], limit * limit) - least(far * far, limit * limit)) / spread[k];
             m->learnt[h][k] = m->learnt[h][k] * (1.0 - begun)
@@ -123,9 +182,15 @@ static void observe(epv_monitor *m, const double *x, const double *z) {
         m->variance[k] = most(m->variance[k] / spread[k], 1.0 / $memory);
     }
     m->last = time;
-    if (sound(m)) return;
-    m->restarts += m->restarts < UINT_MAX;
-    restart(m);
+    if (!sound(m)) {
+        m->restarts += m->restarts < UINT_MAX;
+        restart(m);
+    }
+    memcpy(m->recent[m->next], departure, sizeof departure);
+    memcpy(m->conditions[m->next], x, sizeof m->conditions[0]);
+    m->next = (m->next + 1) % EPV_SETTLING;
+    m->alarms = total(m) + log(m->rate) > 0.0 ? m->alarms + 1 : 0;
+    if (m->alarms == EPV_SETTLING) settle(m);
 }
 
 void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2, double p3, double I) {
@@ -147,14 +212,8 @@ void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2
     }
 }
 
-static double total(const epv_monitor *m) {
-    double sum = m->log[0] + log(WEIGHT[0]);
-    for (int h = 1; h < H; h++) sum = sum_log(sum, m->log[h] + log(WEIGHT[h]));
-    return sum;
-}
-
-double epv_monitor_probability(const epv_monitor *m, double false_alarms_per_hour) {
-    return 1.0 / (1.0 + exp(-log(false_alarms_per_hour) - total(m)));
+double epv_monitor_probability(const epv_monitor *m) {
+    return 1.0 / (1.0 + exp(-log(m->rate) - total(m)));
 }
 
 double epv_monitor_causes(const epv_monitor *m, double *share) {

@@ -83,7 +83,7 @@ int epv_policy_learn(epv_policy_memory *m, float inputs[EPV_POLICY_INPUTS])
     fn_observe(&m->valve, inputs, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
     fn_plan(&m->valve, PERIOD);
 $learnt
-    return fn_cannot_raise(&m->valve) != 0.0f || fn_would_rise_too_far(&m->valve) != 0.0f;
+    return (int)fn_forced(&m->valve, fn_in_unit(inputs, EPV_POLICY_READINGS, $error));
 }
 
 void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
@@ -104,10 +104,12 @@ void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
 int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *now)
 {
     float inputs[EPV_POLICY_INPUTS], logits[2];
-    int must_shut, off;
+    int force, off;
     epv_policy_observe(m, now, inputs);
-    must_shut = epv_policy_learn(m, inputs);
+    force = epv_policy_learn(m, inputs);
     epv_policy_logits(inputs, logits);
-    off = logits[0] >= logits[1] || fn_below_band(&m->valve, inputs, EPV_POLICY_READINGS) != 0.0f;
-    return fn_overruled(&m->senses, must_shut || !off ? 1.0f : 0.0f) != 0.0f;
+    off = force < 0 || (force == 0 && logits[0] >= logits[1]);
+    if (fn_above_band(fn_in_unit(inputs, EPV_POLICY_READINGS, $error)) != 0.0f)
+        return 1; /* this shield holds for the fall-back, too */
+    return fn_overruled(&m->senses, off ? 0.0f : 1.0f) != 0.0f;
 }

@@ -9,6 +9,10 @@
  *     static epv_policy_memory memory;                  // zeros: nothing remembered yet
  *     epv_policy_readings now = {p1, p2, p3, current, target, coil};
  *     coil = epv_policy_step(&memory, &now);            // 1: energise for the coming period
+ *
+ * The period is EPV_POLICY_PERIOD_US. Time counts in calls: called every 2 ms in place of 5 ms, waits end
+ * 2.5 times too early and the rates that are learnt are 2.5 times too slow. A late or early call shifts
+ * its readings by as much; the next calls must keep to the clock, not follow the late one.
  */
 #ifndef EPV_POLICY_H
 #define EPV_POLICY_H
@@ -49,8 +53,8 @@ typedef struct {
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
 /* Its parts: the readings as the observation (the first EPV_POLICY_READINGS
- * entries of the inputs), what is learnt and advised (the entries behind them; returns whether a rule keeps
- * the coil on), and the network's {off, on}. */
+ * entries of the inputs), what is learnt and advised (the entries behind them; returns 1 if a rule keeps the
+ * coil on, -1 if a shield switches it off, else 0), and the network's {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,
                         float inputs[EPV_POLICY_INPUTS]);
 int epv_policy_learn(epv_policy_memory *memory, float inputs[EPV_POLICY_INPUTS]);

@@ -77,7 +77,8 @@ static int component_set_one(component *c, unsigned reference, double value)
     v = &VARIABLE[reference];
     if (v->kind != INPUT && v->kind != PARAMETER)
         return refuse(c, "%s is computed and cannot be set: set an input or a parameter", v->name);
-    if (v->kind == PARAMETER && c->now.phase != CREATED && c->now.phase != INITIALISING)
+    if (v->kind == PARAMETER && c->now.phase != CREATED && c->now.phase != INITIALISING &&
+        value != c->now.model.value[reference])
         return refuse(c, "parameter %s cannot be set %s: set it before initialisation ends", v->name,
                       PHASE[c->now.phase]);
     if (!(value >= v->low && value <= v->high && isfinite(value)))

@@ -18,6 +18,7 @@ typedef struct {
     double value[VARIABLES];
     epv_policy_memory memory;
     double elapsed; /* since the start [s] */
+    double lost;    /* rounding of that sum, which Kahan's method puts back [s] */
     double decisions; /* so far */
 } model;
 
@@ -40,7 +41,7 @@ static void decide(model *m)
 static const char *model_begin(model *m)
 {
     memset(&m->memory, 0, sizeof m->memory);
-    m->elapsed = m->decisions = 0.0;
+    m->elapsed = m->lost = m->decisions = 0.0;
     m->value[V_coil] = 1.0;
     decide(m);
     return NULL;
@@ -54,14 +55,16 @@ static int model_is_sound(const model *m)
     for (k = 0; k < offsetof(epv_policy_memory, waited) / sizeof *remembered; k++)
         if (isnan(remembered[k]))
             return 0;
-    return m->elapsed >= 0.0 && isfinite(m->elapsed) &&
+    return m->elapsed >= 0.0 && isfinite(m->elapsed) && isfinite(m->lost) &&
            m->decisions * PERIOD_S >= m->elapsed - PERIOD_S;
 }
 
 /* Decide at each period's start that lies in the coming h [s], on the inputs as they are. */
 static const char *model_advance(model *m, double h)
 {
-    m->elapsed += h;
+    const double corrected = h - m->lost, sum = m->elapsed + corrected;
+    m->lost = (sum - m->elapsed) - corrected;
+    m->elapsed = sum;
     while (m->decisions * PERIOD_S < m->elapsed - 1e-9)
         decide(m);
     return NULL;
