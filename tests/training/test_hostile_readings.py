@@ -126,9 +126,9 @@ int main(void)
             if (between(0, 50) < 1) {
                 const float odd[] = {NAN, INFINITY, -INFINITY, -9.0f, 17.0f};
                 *given[i] = odd[(int)between(0, 5)], gone |= 1 << i;
-                *good[i] = m.last[i];
+                *good[i] = m.senses.last[i];
                 if (i == 1 || i == 4)
-                    held.p2 = m.last[1];
+                    held.p2 = m.senses.last[1];
             } else if (!(*given[i] > (i == 3 ? -1.0f : 1.0f) && *given[i] < (i == 3 ? 1.0f : 16.0f)))
                 gone |= 32; /* near an end: not judged */
         other = m;
@@ -140,12 +140,13 @@ int main(void)
         if (!error_lost && error >= 0.5f && ++above && !coil)
             return 1;
         if (!gone && error <= -0.5f && now.coil && now.p1 - now.p2 > 1.001f &&
-            now.p1 - now.p3 < 0.499f && !m.failed && m.begun && !(m.valve.after_period_early > 0)) {
+            now.p1 - now.p3 < 0.499f && m.senses.failed == 0 && m.senses.begun > 0 &&
+            !(m.valve.after_period_early > 0)) {
             below++;
             if (coil)
                 return 2;
         }
-        if (gone && other.begun && !m.failed) { /* as if the last good readings stood there */
+        if (gone && other.senses.begun > 0 && m.senses.failed == 0) { /* as the last good ones */
             lost++;
             if (epv_policy_step(&other, &held) != coil)
                 return 3;
@@ -182,11 +183,13 @@ def test_hostile_readings_stay_within_arrays_and_numbers(folder):
 
 def test_no_reading_opens_above_the_band_nor_keeps_shut_below_it_nor_a_lost_one_anything(folder):
     (folder / "random.c").write_text(RANDOM)
-    defined = f"-DREADINGS={READINGS}u"
-    program = build(["cc"], folder, defined, "random.c", "epv_policy.c", "-lm", output="random")
+    readings = 1_000_000
+    program = build(
+        ["cc"], folder, f"-DREADINGS={readings}u", "random.c", "epv_policy.c", "-lm", output="random"
+    )
     done = subprocess.run([program], capture_output=True, text=True, timeout=300, check=False)
     assert done.returncode == 0, done.stderr
-    assert min(map(int, done.stdout.split())) > READINGS / 1000
+    assert min(map(int, done.stdout.split())) > readings / 1000
 
 
 def damaged(observations, rng):

@@ -17,7 +17,6 @@ from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal, write_json, write_text
 from epv_env.common.options import Folder, JudgedSeconds, Number, PlantFile, Quick, Seed
 from epv_env.plant.plantfile import load_plant, plant_subject
-from epv_env.plant.valves import available_cores
 from epv_env.reward import BAND_BAR
 from training.evaluation.batches import run_jobs
 from training.evaluation.named import HELP, SHIPPED, named_controllers
@@ -37,12 +36,12 @@ KEPT = 4
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """Controller and plants, and how many episodes."""
+    """The controller, the plants, and how long to look."""
 
     out: Folder = Path("runs/rare")
-    controller: Annotated[str, {"metavar": "NAME"}, HELP] = SHIPPED
+    controller: Annotated[str, HELP] = SHIPPED
     region: Annotated[str, {"choices": tuple(REGIONS)}, "plants"] = "ten-percent"
-    particles: Annotated[int, Number(int, 2 * CHAIN, 10**6), "episodes of a level"] = 512
+    particles: Annotated[int, Number(int, 2 * CHAIN, 10**6), "episodes of a level"] = 2048
     repetitions: Annotated[int, Number(int, 2, 10**4), "independent estimates"] = 10
     least: Annotated[float, Number(float, 1e-12, 0.5), "probability to search down to"] = 1e-8
     duration: JudgedSeconds = 10.0
@@ -73,7 +72,7 @@ def run(options: Options) -> None:
         level=episodes.worst, moves=episodes.moves, particles=options.particles // CHAIN * CHAIN
     )
     journal = Journal(options.out / "finished.jsonl", {**plant_subject(plant), **settings})
-    work = {"journal": journal, "workers": options.workers or available_cores()}
+    work = {"journal": journal, "workers": options.workers}
     pilot = partial(
         problem.thresholds, BAND_BAR, options.least, np.random.default_rng([options.seed, 0])
     )
@@ -85,7 +84,12 @@ def run(options: Options) -> None:
     found = run_jobs(jobs, what="repetitions", **work)
     table = tail(thresholds, found)
     write_text(options.out / "tail.csv", table.to_csv(index=False))
-    result = {"format": "epv-rare/1", "label": label, "settings": settings, **summary(thresholds, found)}
+    result = {
+        "format": "epv-rare/1",
+        "label": label,
+        "settings": settings,
+        **summary(thresholds, found, options.least),
+    }
     rare = [episode for each in found for episode in each["rare"]]
     write_json(options.out / "results.json", {**result, "episodes": rare})
     if rare:
@@ -103,12 +107,16 @@ def repetition(
     return {"shares": found.shares, "runs": found.runs, "rare": described}
 
 
-def summary(thresholds: list[float], found: list[dict[str, Any]]) -> dict[str, Any]:
-    """Probability of the largest excursion that was reached, its interval, and what it took."""
+def summary(thresholds: list[float], found: list[dict[str, Any]], least: float) -> dict[str, Any]:
+    """Probability of the largest excursion that was reached, its interval, and what it took.
+
+    "stuck": the moves found no worse episodes, though the probability was not yet below `least`.
+    """
     last = tail(thresholds, found).iloc[-1].to_dict()
     plain = plain_episodes(found)
     return {
         **last,
+        "stuck": last["excursion_bar"] < BAND_BAR and CHAIN ** -len(thresholds) >= least,
         "runs": sum(each["runs"] for each in found),
         "plain_episodes": plain if np.isfinite(plain) else None,
     }
@@ -117,6 +125,11 @@ def summary(thresholds: list[float], found: list[dict[str, Any]]) -> dict[str, A
 def sentence(result: dict[str, Any]) -> str:
     """What was found, in words."""
     interval = f"{result['low']:.2g} to {result['high']:.2g}"
+    if result["stuck"]:
+        return (
+            f"{result['label']}: no episodes beyond {result['excursion_bar']:.3f} bar were found, which "
+            "bounds nothing: give more --particles, in another --out."
+        )
     if result["excursion_bar"] < BAND_BAR:
         return (
             f"{result['label']} leaves with a probability below {result['high']:.2g}: an excursion of "

@@ -108,14 +108,14 @@ def run_batches(
 
 
 def run_jobs(
-    jobs: Mapping[str, Callable[[], Any]], *, journal: Journal, workers: int, what: str
+    jobs: Mapping[str, Callable[[], Any]], *, journal: Journal, workers: int | None, what: str
 ) -> list[Any]:
     """Results of jobs by name, JSON-ready, in their order; those in the journal are not run again.
 
     what: name of the progress bar.
     """
     missing = {name: job for name, job in jobs.items() if name not in journal}
-    pool: Any = Parallel(n_jobs=workers, return_as="generator_unordered")
+    pool: Any = Parallel(n_jobs=workers or available_cores(), return_as="generator_unordered")
     done = pool(delayed(_named)(name, job) for name, job in missing.items())
     for name, result in progress(done, what=what, total=len(missing)):
         journal.add(name, result)

@@ -21,8 +21,7 @@ from controllers.policy_files import policy_digest
 from docs.studies.common import PAGE, fill, table
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, read_json
-from epv_env.common.options import COUNT, Number
-from epv_env.plant.valves import available_cores
+from epv_env.common.options import COUNT
 from training.evaluation.batches import run_jobs
 from training.evaluation.metrics import violation_interval
 from training.evaluation.plots import in_words
@@ -83,15 +82,12 @@ def batch(statement: Statement, region: str, first: int) -> dict[str, Any]:
 
 
 def results(statement: Statement, journal: Journal, region: str) -> dict[str, Any]:
-    """What is known of a region: episodes, seeds that left, exceedances, the worst."""
+    """What is known of a region: episodes, seeds that left, the worst excursion and its seed."""
     found = [journal[name] for name in names(statement, region) if name in journal]
     return {
         "episodes": BATCH * len(found),
         "left": [seed for each in found for seed in each["left"]],
-        "above": np.sum([each["above"] for each in found] or [[0]], axis=0).tolist(),
-        "worst": max(
-            (tuple(reversed(pair)) for each in found for pair in each["worst"]), default=(0, 0)
-        ),
+        "worst": max((each["worst"][0][::-1] for each in found), default=[0.0, 0]),
     }
 
 
@@ -113,14 +109,7 @@ def page_table(statement: Statement, journal: Journal) -> str:
             f"{low:.2g} to {high:.2g}",
             f"{known['worst'][0]:.3f} (seed {known['worst'][1]})", ", ".join(map(str, left)) or "none",
         ])  # fmt: skip
-    headings = [
-        "plants",
-        "episodes",
-        "left",
-        "95 % interval",
-        "worst excursion [bar]",
-        "seeds that left",
-    ]
+    headings = ["plants", "episodes", "left", "95 % interval", "worst [bar]", "seeds that left"]
     return table(headings, rows)
 
 
@@ -128,7 +117,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run what is missing; returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
     parser.add_argument("--episodes", type=COUNT, help="of each region, from the first (default: all)")
-    parser.add_argument("--workers", type=Number(int, 1, 1024), help="processes (default: all cores)")
+    parser.add_argument("--workers", type=COUNT, help="processes (default: all cores)")
     options = parser.parse_args(arguments)
     statement = announced()
     journal = Journal(RESULTS, {"statement": vars(statement)})
@@ -139,7 +128,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for name, first in list(names(statement, region).items())[:count]
     ]
     jobs = {name: partial(batch, statement, region, first) for name, region, first in seeds}
-    run_jobs(jobs, journal=journal, workers=options.workers or available_cores(), what="statement")
+    run_jobs(jobs, journal=journal, workers=options.workers, what="statement")
     text = page_table(statement, journal)
     fill(FOLDER / PAGE, {"statement": text})
     print(text)

@@ -20,7 +20,7 @@ from controllers.tuned import tuned
 from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, table
 from docs.studies.rare.sensors import SINGLE, fault_table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.commands import parse
+from epv_env.common.options import parse
 from training.commands import rare
 from training.evaluation.seeds import RANGE, STATEMENT_SEED
 
@@ -33,7 +33,7 @@ RUNS: dict[str, tuple[str, ...]] = {
     "ppo-conf": ("--region", "confidence", "--least", "1e-6"),
 }
 """Options of `epv rare` by the name of the folder of results."""
-SIZE = ("--particles", "256", "--repetitions", "6")
+SIZE = ("--particles", "2048", "--repetitions", "10")
 FAULT_EPISODES = 12
 """Of each fault alone; a quarter of it of each pair."""
 FAULT_SEED = STATEMENT_SEED + RANGE
@@ -60,10 +60,13 @@ def markdown(rows: pd.DataFrame) -> str:
 
 
 def sensor_rows(found: pd.DataFrame) -> pd.DataFrame:
-    """Faults of one sensor: share that leaves, and worst excursion, of each controller."""
-    text = found["left_percent"].map("{:.0f} %, ".format) + found["worst_bar"].map("{:.2f} bar".format)
+    """Faults of one sensor where some controller left: share that leaves, and worst excursion."""
+    worst = found["worst_bar"].map("{:.2f}".format).replace("inf", "empties")
+    text = found["left_percent"].map("{:.0f}%, ".format) + worst
+    found = found[found.groupby("fault")["left_percent"].transform("max") > 0]
     wide = found.assign(text=text).pivot(index="fault", columns="controller", values="text")
-    return wide.loc[[f"{channel} {fault}" for ((channel, fault),) in SINGLE]].reset_index()
+    single = [f"{channel} {fault}" for ((channel, fault),) in SINGLE]
+    return wide.loc[[name for name in single if name in wide.index]].reset_index()
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

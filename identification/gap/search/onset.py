@@ -76,7 +76,7 @@ def spans_of_causes(
     acting = np.array([in_span(drives, *span) for span in spans])
     excluded = np.outer([s.cause.label in lasting for s in signatures], [s != (0, count) for s in spans])
     squares = np.where(excluded, np.inf, least_squares_by_span(runs, signatures, acting))
-    first, at = np.unravel_index(np.argmin(squares), squares.shape)
+    first, at = (int(place) for place in np.unravel_index(np.argmin(squares), squares.shape))
     found = _likeliest(signatures, squares, spans, count, readings)
     tolerated = 2.0 * tolerated_misfit(readings)
     if np.min(squares) > readings + tolerated:
