@@ -82,15 +82,9 @@ def reward_terms(
 ):
     """RewardTerms of one control period, of numbers or arrays (n,). The step compiles this function.
 
-    Args:
-        weights: RewardWeights, or a record with its fields.
-        period: control period [s].
-        error_bar: p2 - target at the end of the period [bar].
-        highest_error_bar: its greatest value within the period [bar].
-        lowest_error_bar: its least value within the period [bar].
-        switchings: of the coil.
-        vented_kg: air blown off [kg].
-        failed: whether the circuit is empty.
+    weights: RewardWeights, or a record with its fields. period: control period [s]. error_bar: p2 -
+    target at the end of the period [bar], and its greatest and least value within it. switchings: of
+    the coil. vented_kg: air blown off [kg]. failed: whether the circuit is empty.
     """
     scale = period / REFERENCE_PERIOD
     outside = np.maximum(highest_error_bar, -lowest_error_bar) > weights.band_bar

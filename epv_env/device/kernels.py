@@ -12,7 +12,6 @@ import numpy as np
 from numba import cuda, float64, int64
 
 from epv_env.device.random import draw_normals, philox
-from epv_env.device.single import single_try_step
 from epv_env.period import begin_period, end_period, observe
 from epv_env.plant.integrate import MAX_STEPS, NONE, STEPS, VALVE, WAITING, go_on
 from epv_env.plant.lanes import EVENT, N_COEFFICIENT, N_EFFECT, N_INPUT, N_ROW, N_STATE, REMAINING
@@ -145,17 +144,12 @@ def restart(b, starts, r, key, instead):
         r.terminated[i] = r.truncated[i] = r.ended[i] = False
 
 
-TRY_STEP = {"double": try_step, "single": single_try_step}
-"""By the precision of the rates of change."""
-
-
 @cache
-def step_kernel(rule: Callable[..., Any], extended: bool, precision: str = "double") -> Any:
+def step_kernel(rule: Callable[..., Any], extended: bool) -> Any:
     """The kernel that takes one control period of all valves with or without effects.
 
-    rule: of one action (actions.py). precision: a key of TRY_STEP.
+    rule: of one action (actions.py).
     """
-    attempt = TRY_STEP[precision]
 
     @cuda.jit
     def step(b, r, rules, actions, slots, key, limits, longest):
@@ -179,7 +173,7 @@ def step_kernel(rule: Callable[..., Any], extended: bool, precision: str = "doub
             if queue[VALVE, 0] == NONE:
                 break
             queue[STEPS, 0] += 1
-            attempt(work, longest, extended)
+            try_step(work, longest, extended)
         draw_normals(key, i, r.started[i], e.steps + 1, NOISE, e.noise, r.noise[i, 0])
         end_period(b.episodes, rules, r.noise, b.state, r.before, r.lowest, r.highest, b.sensors,
                    r.figures, r.observation, i, i + 1)  # fmt: skip

@@ -10,8 +10,7 @@ from numba.core import config
 
 from epv_env.actions import check_unmasked
 from epv_env.common.extras import how_to_install
-from epv_env.common.field_types import shown
-from epv_env.device.kernels import THREADS, TRY_STEP, Batch, Results, restart, step_kernel
+from epv_env.device.kernels import THREADS, Batch, Results, restart, step_kernel
 from epv_env.observation import LAYOUT
 from epv_env.period import rules_of
 from epv_env.plant.equations import State
@@ -58,17 +57,12 @@ class _DeviceVectorEnv(_ValveVectorEnv):
     without `privileged`, recorded signals and moving targets; DISABLED resets all episodes at once, and
     lets ended ones run on. And:
         starts: number of different starts, at most num_envs.
-        precision: of the rates of change, "double" or "single"; states are double in either.
     """
 
-    def __init__(
-        self, num_envs: int = 1, *, starts: int = 4096, precision: str = "double", **arguments: Any
-    ):
+    def __init__(self, num_envs: int = 1, *, starts: int = 4096, **arguments: Any):
         check_available()
         check_count("starts", starts)
-        if precision not in TRY_STEP:
-            raise OptionError(f"precision = {shown(precision)}: give 'double' or 'single'")
-        self._most_starts, self._precision = starts, precision
+        self._most_starts = starts
         super().__init__(num_envs, **arguments)
         if self.privileged:
             raise OptionError("on a device, privileged is False: its truths stay there")
@@ -110,7 +104,7 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         if self.autoreset_mode is AutoresetMode.NEXT_STEP:
             self._begin_ended(instead=True)
         for extended in (False, True)[: 1 + self._with_effects]:
-            kernel = step_kernel(self.action_form.rule, extended, self._precision)
+            kernel = step_kernel(self.action_form.rule, extended)
             self._launch(kernel, self._batch, r, self._rules, asked, self.action.slots, self._key,
                          self._limits, self.task.valves.step)  # fmt: skip
         infos = {"figures": r.figures, "begun": r.begun}

@@ -17,14 +17,11 @@ import pytest
 
 import epv_env  # noqa: F401 - registers the ids
 from epv_env.actions import OnOff
-from epv_env.device.kernels import TRY_STEP, Batch, restart, step_kernel
+from epv_env.device.kernels import Batch, restart, step_kernel
 from epv_env.device.random import draw_normals, philox
-from epv_env.device.single import in_single, single_rates
 from epv_env.device.vector_env import blank_results
 from epv_env.period import rules_of
-from epv_env.plant import integrate
 from epv_env.signals import OptionError
-from tests.env.rollouts import native
 
 N, PERIODS = 4, 12
 LIMITS = [PERIODS] * (N - 1) + [2 * PERIODS]  # the last valve goes on
@@ -34,15 +31,12 @@ CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "ordinary": ("EPValve-v0", {}),
     "effects, delay and duty": ("EPValvePWM-v0", {"conditions": WORN, "autoreset_mode": "SameStep"}),
 }
-SINGLE_WITHIN = 5.0  # Pa, that is 0.05 mbar
 NAMES = ("p2", "observation", "reward", "terminated", "truncated", "deviation", "shown")
 
 
 def made(case: str, device: str) -> Any:
-    """The environments of a case; device: "cpu", "cuda", or "cuda single" for single precision."""
+    """The environments of a case."""
     identifier, options = CASES[case]
-    device, _, precision = device.partition(" ")
-    options = {**options, "precision": precision} if precision else options
     options = {"sensor_noise": 0.0, "max_episode_steps": LIMITS, **options}
     return gymnasium.make_vec(identifier, num_envs=N, device=device, to_host=True, **options)
 
@@ -102,37 +96,6 @@ def test_a_simulated_device_agrees_with_the_cpu(case, tmp_path):
         assert np.any(np.all(each == device["first"], axis=1))
 
 
-def test_single_precision_agrees_less_closely_on_a_simulated_device(tmp_path):
-    case = "effects, delay and duty"
-    device, cpu = simulated(tmp_path, case, "cuda single"), rollout(case, "cpu")
-    difference = np.max(np.abs(device["p2"] - cpu["p2"])[: PERIODS - 1])
-    assert WITHIN < difference < SINGLE_WITHIN
-
-
-def switched_at_random(n: int = 256, periods: int = 400) -> np.ndarray:
-    """p2 of n plants within ±10 % under random switching, (periods, n) [Pa]."""
-    envs = native("EPValve-v0", n, parameters="ten_percent", sensor_noise=0.0, threads=1)
-    envs.reset(seed=3)
-    valves, rng, on, found = envs.task.valves, np.random.default_rng(0), np.ones(n, dtype=bool), []
-    for _ in range(periods):
-        on ^= rng.random(n) < 0.15
-        valves.inputs.U[:], valves.inputs.sigma_S[:] = 24.0 * on, 2e-3
-        valves.advance(np.full(n, 5e-3))
-        found.append(valves.state.p2.copy())
-    return np.array(found)
-
-
-@pytest.mark.slow
-def test_single_precision_stays_close_over_many_events(monkeypatch):
-    double = switched_at_random()
-    monkeypatch.setattr(integrate, "run_nominal", in_single(integrate.run_nominal))
-    difference = np.max(np.abs(switched_at_random() - double))
-    assert WITHIN < difference < SINGLE_WITHIN
-    signatures = str(single_rates.nopython_signatures)  # nothing becomes double on the way
-    assert "float32" in signatures
-    assert "float64" not in signatures
-
-
 def test_random_numbers_are_those_of_the_published_generator():
     """First known answer of Random123 (kat_vectors, philox4x32 10)."""
     zero = np.uint64(0)
@@ -147,8 +110,7 @@ def test_random_numbers_are_those_of_the_published_generator():
 
 
 @pytest.mark.parametrize("extended", [False, True], ids=["nominal", "extended"])
-@pytest.mark.parametrize("precision", TRY_STEP)
-def test_the_kernels_compile_for_an_accelerator(extended, precision, monkeypatch):
+def test_the_kernels_compile_for_an_accelerator(extended, monkeypatch):
     pytest.importorskip("numba_cuda", reason="no compiler for accelerators: install the extra gpu")
     dispatcher, cuda = import_module("numba.cuda.dispatcher"), import_module("numba.cuda")
     h100 = SimpleNamespace(compute_capability=(9, 0))
@@ -158,7 +120,7 @@ def test_the_kernels_compile_for_an_accelerator(extended, precision, monkeypatch
     rules = rules_of(task.settings)
     key, actions, limits = np.uint64(1), np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
     arguments = {
-        step_kernel(OnOff.rule, extended, precision): (b, r, rules, actions, 1, key, limits, 2e-4),
+        step_kernel(OnOff.rule, extended): (b, r, rules, actions, 1, key, limits, 2e-4),
         restart: (b, b, r, key, True),
     }
     for kernel, values in arguments.items():
@@ -179,8 +141,8 @@ def test_a_device_that_is_not_there_is_refused():
 
 
 def test_an_option_of_the_device_is_refused_on_the_cpu():
-    with pytest.raises(OptionError, match="precision is an option of device"):
-        gymnasium.make_vec("EPValve-v0", num_envs=2, precision="single")
+    with pytest.raises(OptionError, match="starts is an option of device"):
+        gymnasium.make_vec("EPValve-v0", num_envs=2, starts=1)
 
 
 if __name__ == "__main__":

@@ -95,10 +95,6 @@ def test_a_finished_run_is_not_overwritten_unasked(finished):
         (["--timesteps", "0"], "--timesteps"),
         (["--switching-price", "-1"], "must be a number from 0 to 1000"),
         (["--resume"], "nothing to resume"),
-        (
-            ["--device", "cuda"],
-            "needs an NVIDIA accelerator with its driver, and numba-cuda: pip install",
-        ),
     ],
 )
 def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):

@@ -22,7 +22,6 @@ from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import write_text
 from epv_env.common.options import (
     Count,
-    Device,
     Folder,
     JudgedSeconds,
     Number,
@@ -56,7 +55,7 @@ RIVALS = (
 """Beside the policy in the verdict's table."""
 RIVAL = "adaptive pulse"
 """Whom the verdict sets the policy against: the best classic controller."""
-SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price", "device")
+SAME_WHEN_RESUMED = ("seed", "plant", "scenario", "parameters", "switching_price")
 """Options that a resumed training must share with its beginning."""
 OWN = (
     CONTRACT_FILE, WEIGHTS_FILE, CONFIG, "validation.csv", "comparison.csv", "comparison.png",
@@ -83,7 +82,6 @@ class Options:
         float, Number(float, 0.0, 1000.0),
         "reward's price of one switching of the coil: trades wear against breakdown",
     ] = RewardWeights().switching  # fmt: skip
-    device: Annotated[Device, "of rollout and update: cuda is an NVIDIA accelerator (extra gpu)"] = "cpu"
     resume: Annotated[bool, AGAIN, "go on from the folder's checkpoint"] = False
     force: Annotated[bool, AGAIN, "begin anew in a folder that holds a training already"] = False
     quick: Quick = False
@@ -98,10 +96,6 @@ def run(options: Options) -> None:
     as_region(options.parameters, plant)  # refuses one that the plant does not have
     check_scenario(options.scenario)
     weights = RewardWeights(switching=options.switching_price)
-    if options.device == "cuda":
-        from training.learners.ppo import check_accelerator
-
-        check_accelerator()
     begin_folder(options, plant)
     write_options(options.out, configuration(options, plant))
 
@@ -112,7 +106,7 @@ def run(options: Options) -> None:
     provenance = {"plant": plant.name, "switching_price": options.switching_price}
     validations = train(
         task, options.out, seed=options.seed, timesteps=options.timesteps, resume=options.resume,
-        provenance=provenance, device=options.device, **shorter,
+        provenance=provenance, **shorter,
     )  # fmt: skip
     save_figure(learning_curve(validations), options.out / "learning_curve.png")
     print(verdict(options, plant, weights))

@@ -60,7 +60,6 @@ def make_training_env(
     scenario: str = "mixed",
     parameters: str | Region | Mixture = "sensitive_ten_percent",
     weights: RewardWeights,
-    device: str = "cpu",
 ) -> VecEnv:
     """Episodes on drawn plants, the learnt quantities among the observations, the rules in front.
 
@@ -70,8 +69,6 @@ def make_training_env(
         scenario: of the consumption.
         parameters: region that plants are drawn from, or its name.
         weights: prices of the reward.
-        device: that simulates: "cpu", or "cuda" for an accelerator. The valve learner stays on the host,
-            as stable-baselines3's rollouts do.
     """
     lengths = range(SHORTEST, LONGEST + 1, ROLLOUT)
     env = gymnasium.make_vec(
@@ -85,7 +82,5 @@ def make_training_env(
         parameters=parameters,
         conditions=CONDITIONS,
         weights=training_weights(weights),
-        device=device,
-        to_host=True,
     )
     return ScaledReward(VecMonitor(SB3VectorEnv(LearntObservation(env, rules=True))))

@@ -25,8 +25,6 @@ from epv_env.conditions import Conditions
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Mixture, Region
 from epv_env.reward import RewardWeights
-from epv_env.signals import OptionError
-from epv_env.vector_entry import check_device
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import VALIDATION_SEED, first_training_seed
@@ -83,19 +81,7 @@ def linear(first: float, last: float, remaining: float) -> float:
     return last + (first - last) * remaining
 
 
-def check_accelerator() -> None:
-    """Raises OptionError unless numba and torch both reach an accelerator."""
-    check_device("cuda")
-    from epv_env.device.vector_env import SIMULATED
-
-    if not (SIMULATED or torch.cuda.is_available()):
-        raise OptionError(
-            "this build of torch reaches no NVIDIA accelerator: install one for CUDA "
-            "(https://pytorch.org/get-started/locally), or train on the CPU"
-        )
-
-
-def make_model(env: VecEnv, *, seed: int, device: str = "cpu") -> PPO:
+def make_model(env: VecEnv, *, seed: int) -> PPO:
     """A new model that begins as the adaptive pulse with some exploration."""
     return PPO(
         AdvisedPolicy,
@@ -104,7 +90,7 @@ def make_model(env: VecEnv, *, seed: int, device: str = "cpu") -> PPO:
         ent_coef=ENTROPY,
         batch_size=min(BATCH, ROLLOUT * env.num_envs),
         seed=seed,
-        device=device,
+        device="cpu",
         **PPO_SETTINGS,
     )
 
@@ -226,7 +212,6 @@ def train(
     validation_duration: float = VALIDATION_DURATION,
     resume: bool = False,
     provenance: dict[str, Any] | None = None,
-    device: str = "cpu",
 ) -> list[dict[str, float]]:
     """Train until `timesteps`, and write the best validated policy into the folder.
 
@@ -243,14 +228,13 @@ def train(
         validation_duration: length of one of them [s].
         resume: whether to go on from the folder's newest checkpoint.
         provenance: of the training, for the policy's file.
-        device: of rollout and update: "cpu", or "cuda" for an accelerator.
 
     Returns:
         A row for each validation.
     """
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
-    env = make_training_env(num_envs=num_envs, device=device, **vars(task))
-    model = make_model(env, seed=seed, device=device)
+    env = make_training_env(num_envs=num_envs, **vars(task))
+    model = make_model(env, seed=seed)
     resumed = resume and load_checkpoint(model, folder)
     model.set_logger(Logger(folder=None, output_formats=[]))  # the default leaves a folder in /tmp
     seed_episodes(model, seed)
