@@ -138,14 +138,17 @@ class FitCache:
         return FitCache(self.plant, self.journal, self.announce, self.prefix + prefix)
 
     def __call__(self, step: str, fit: Callable[[], list[Estimate]]) -> list[Estimate]:
-        """The estimates that `fit` returns, or returned in an earlier run under this step's name."""
+        """The estimates that `fit` returns, or returned in an earlier run under this step's name.
+
+        Those of an earlier run have no nuisance slopes.
+        """
         step = self.prefix + step
         self.announce(step)
         if self.journal is not None and step in self.journal:
             return self.journal.read(step, lambda found: [self._estimate(each) for each in found])
         estimates = fit()
         if self.journal is not None:
-            # Nuisance slopes are computed again.
+            # Nuisance slopes are large: the caller knows those that the fits began with.
             entries = [
                 {
                     "causes": list(estimate.hypothesis.labels),
@@ -153,6 +156,7 @@ class FitCache:
                     "local": estimate.run_values.tolist(),
                     "chi_square": estimate.chi_square,
                     "converged": estimate.converged,
+                    "given_up": estimate.given_up,
                     "laws": [
                         [o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws
                     ],
@@ -177,6 +181,7 @@ class FitCache:
             run_values=np.array(entry["local"]).reshape(runs, -1),
             chi_square=entry["chi_square"],
             converged=entry["converged"],
+            given_up=entry["given_up"],
         )
 
 

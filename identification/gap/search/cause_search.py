@@ -147,8 +147,13 @@ class HypothesisPool:
                 starts += [start.estimate for start in found[:1]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
-        name = _names(chosen)
-        return [each for each in self.cache(f"one law more: {name}", fits) if not each.given_up]
+        slopes = {frozenset(each.labels): each.estimate.slopes for each in chosen}
+        found = self.cache(f"one law more: {_names(chosen)}", fits)
+        return [
+            replace(each, slopes=slopes[frozenset(each.hypothesis.labels)])
+            for each in found
+            if not each.given_up
+        ]
 
 
 def _name(evaluated: EvaluatedHypothesis) -> str:
@@ -232,7 +237,8 @@ def _fit_beside(
         starts = [*(first if pool.small else best_start_of_each(first)), *best_start_of_each(opened)]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    pool.add(pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits))
+    found = pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
+    pool.add([replace(each, slopes=base.slopes) for each in found])
 
 
 def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:

@@ -3,12 +3,14 @@
 import numpy as np
 import pytest
 
+from epv_env.common.files import Journal
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.fit.evidence import evaluate
 from identification.gap.fit.fitting_problem import FitCache, Hypothesis
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.recalibration import recalibrate
 from identification.gap.judge.verdict import Ranking
+from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.search import cause_search
 from identification.gap.search.cause_search import HypothesisPool, _leave_causes_out
 from tests.identification.gap.drives import Drive
@@ -64,6 +66,19 @@ def test_a_cause_that_has_become_superfluous_is_left_out():
     assert pool.posterior().hypotheses[0].labels == ("lag", "drag")
     _leave_causes_out(pool)
     assert pool.posterior().hypotheses[0].labels == ("lag",)
+
+
+def test_a_search_that_is_resumed_gives_the_undisturbed_answer(tmp_path, monkeypatch):
+    """With fits that were given up, and nuisance slopes that a journal does not keep."""
+    monkeypatch.setattr(cause_search, "MULTI_START_CAUSES", 0)
+    plant = prepared(Drive(THRESHOLDS))
+    cache = FitCache(plant, Journal(tmp_path / "fits.jsonl", {}))
+    whole, resumed = rank_hypotheses(plant, cache), rank_hypotheses(plant, cache)
+    assert resumed.inclusion == whole.inclusion
+    np.testing.assert_array_equal(resumed.probabilities, whole.probabilities)
+    for first, again in zip(whole.hypotheses, resumed.hypotheses, strict=True):
+        assert first.labels == again.labels
+        np.testing.assert_array_equal(first.estimate.vector, again.estimate.vector)
 
 
 def test_a_catalogue_without_the_true_causes_names_none():
