@@ -6,6 +6,7 @@ A sensor turns a signal into what the bench's data acquisition gives: range, 12-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -191,11 +192,11 @@ SENSOR_SYMBOLS = tuple(symbol for channel in MEASURED_CHANNELS for symbol in cha
 """Parameters of the sensors that are not in the plant's equations."""
 
 
-def readings(state: State, p: Mapping[str, Value]) -> dict[str, Value]:
+def readings(state: State, p: Any) -> dict[str, Value]:
     """Values before noise and rounding, by channel [SI]; as the state but for effects of sensors.
 
-    state: fields of any shape. p: SENSOR_SYMBOLS, numbers or arrays that broadcast to it. A channel that
-    is an input of the bench (the voltage) has no reading here.
+    state: fields of any shape. p: SENSOR_SYMBOLS by name, numbers or arrays that broadcast to it. A
+    channel that is an input of the bench (the voltage) has no reading here.
     """
     return {
         channel.name: channel.reading(state, p)

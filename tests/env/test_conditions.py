@@ -35,7 +35,7 @@ def observed(name, options, commands, n=2):
 
 @pytest.mark.parametrize("identifier", ["EPValve-v0", "EPValvePWM-v0"])
 def test_single_and_batch_agree_under_all_conditions(identifier):
-    options = {"conditions": Conditions(**dict.fromkeys(PROBABILITIES, 0.5)), "max_episode_steps": 40}
+    options = {"conditions": dict.fromkeys(PROBABILITIES, 0.5), "max_episode_steps": 40}
     commands = actions(identifier, 5, 90)
     found = run(native(identifier, 5, **options), commands)
     assert_same(found, run(side_by_side(identifier, 5, **options), commands))

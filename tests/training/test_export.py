@@ -135,7 +135,7 @@ def test_nothing_in_it_is_undefined(any_copy, tmp_path):
     [
         ("epv_policy.c", r"(BIAS_0\[\d+\] = \{\s*)[^,]+,", r"\g<1>3.0f,"),
         ("epv_policy.c", r"10395\.0f;", "10394.0f;"),
-        ("epv_policy.c", r"change\(m->p2, m->newest, 4\)", "change(m->p2, m->newest, 3)"),
+        ("epv_learner.h", r"(SENSOR_CHECK_P2_LAGS\[\d+\] = \{\s*1\.0f, 2\.0f, )4", r"\g<1>3"),
         ("epv_policy.c", r"m->waited = 1;", "m->waited = 0;"),
         ("epv_learner.h", r"/ v->pace\)", "/ (1.02f * v->pace))"),
         ("epv_learner.h", r"v->gain \* fn_gained_at_once", "2.0f * v->gain * fn_gained_at_once"),
@@ -218,7 +218,7 @@ def test_a_reading_that_is_not_a_number_counts_as_the_one_before(exported, tmp_p
         second[0, row] = instead
         found.append((controller.act(second), controller.memory["valve"].tobytes(), controller.memory))
     assert found[0][:2] == found[1][:2]
-    assert [each["lost"].tolist() for *_, each in found] == [[1], [0]]
+    assert [each["senses"]["lost"].tolist() for *_, each in found] == [[1], [0]]
 
 
 def test_the_contract_says_what_the_files_hold(exported, tmp_path):

@@ -88,8 +88,10 @@ class Episodes:
         """What is drawn of each episode (n, numbers)."""
         settings = self.settings
         ends = (PLANT, PLANT + DISTURBANCE)
+        streams = [map(NormalsAsDraws, np.split(row, ends)) for row in normals]
         return [
-            Start.from_streams(*map(NormalsAsDraws, np.split(row, ends)), settings) for row in normals
+            Start.from_streams(plant, disturbance, noise, settings)
+            for plant, disturbance, noise in streams
         ]
 
     def worst(self, normals: NDArray) -> NDArray:

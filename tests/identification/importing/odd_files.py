@@ -154,7 +154,7 @@ def nanoseconds(at: Path, true: Recording) -> Path:
             timestamps=true.time,
             name=f"{name}_",
             unit=unit,
-            conversion=conversion if name == "time" else None,
+            conversion=conversion if name == "time" else None,  # type: ignore[arg-type]
         )
         for name, (values, unit) in columns_of(true).items()
     ]

@@ -95,7 +95,7 @@ def test_each_cause_has_its_drives_also_beside_another_one():
         residual = rng.normal(size=40)
         for signature in signatures:
             label = signature.cause.label
-            size = sizes.get(label, 0.0) * in_span(drive_number, *true[label])
+            size = sizes.get(label, 0.0) * in_span(np.array(drive_number), *true[label])
             residual += size * signature.changes[r]
         none = np.zeros((40, 0))
         runs.append(
@@ -132,7 +132,7 @@ def test_an_opening_begins_at_the_pressure_of_its_first_sample():
     """Consumption of 5 g/s lowers p2 while it is averaged over the hold."""
     time, p = 0.005 * np.arange(40), PLANT.parameters
     slope = -5.0 * GRAM * p["R_gas"] * p["T_env"] / p["V2"]
-    same = {name: np.full(40, value) for name, value in {"U": 24.0, "I": 0.5, "p1": 11e5}.items()}
+    same: Any = {name: np.full(40, value) for name, value in {"U": 24.0, "I": 0.5, "p1": 11e5}.items()}
     recording = Recording(
         name="opening", role="calibration", period=0.005, p2=8e5 + slope * time,
         p3=same["p1"], sigma_S=np.full(40, 5.0 * GRAM), **same,
