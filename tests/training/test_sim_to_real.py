@@ -111,7 +111,7 @@ def test_what_is_finished_is_kept(finished):
 
 def test_another_effect_in_the_same_folder_is_refused(finished, capsys):
     assert run_loop(finished, "--effect", "seat_leak=1e-7") == 2
-    assert "holds a sim-to-real run with effect command_delay=0.008, not" in capsys.readouterr().err
+    assert "holds a sim-to-real run with effect command_delay=0.006, not" in capsys.readouterr().err
 
 
 def test_another_effect_is_refused_wherever_the_first_was_stopped(tmp_path, monkeypatch, capsys):
@@ -132,7 +132,7 @@ def test_another_effect_is_refused_wherever_the_first_was_stopped(tmp_path, monk
 def test_deployments_belong_to_both_valves_and_the_policy(finished):
     header, *lines = (finished / "after" / "deployments.jsonl").read_text().splitlines()
     subject = json.loads(header)["subject"]
-    assert subject[MEASURED]["plant"]["effects"] == {"command_delay": {"t_delay": 0.008}}
+    assert subject[MEASURED]["plant"]["effects"] == {"command_delay": {"t_delay": 0.006}}
     assert subject[SIMULATED]["plant"]["parameters"]
     digest = policy_digest(finished / "after")
     assert any(f"PPO {digest}" in json.loads(line)["name"] for line in lines)

@@ -1,7 +1,7 @@
 """Hypotheses, their estimates, and the least-squares problem that a plant's recordings pose."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -137,18 +137,30 @@ class FitCache:
         """The same cache for a second search: all names of its steps begin with the prefix, too."""
         return FitCache(self.plant, self.journal, self.announce, self.prefix + prefix)
 
-    def __call__(self, step: str, fit: Callable[[], list[Estimate]]) -> list[Estimate]:
+    def __call__(
+        self,
+        step: str,
+        fit: Callable[[], list[Estimate]],
+        slopes: Callable[[Estimate], NuisanceSlopes | None] = lambda estimate: None,
+    ) -> list[Estimate]:
         """The estimates that `fit` returns, or returned in an earlier run under this step's name.
 
-        Those of an earlier run have no nuisance slopes.
+        slopes: gives an estimate of an earlier run its nuisance slopes, which a journal does not keep.
         """
         step = self.prefix + step
         self.announce(step)
         if self.journal is not None and step in self.journal:
-            return self.journal.read(step, lambda found: [self._estimate(each) for each in found])
+
+            def read(found: list[dict[str, Any]]) -> list[Estimate]:
+                estimates = [self._estimate(entry) for entry in found]
+                return [
+                    replace(each, slopes=slopes(each)) if entry["own_slopes"] else each
+                    for each, entry in zip(estimates, found, strict=True)
+                ]
+
+            return self.journal.read(step, read)
         estimates = fit()
         if self.journal is not None:
-            # Nuisance slopes are large: the caller knows those that the fits began with.
             entries = [
                 {
                     "causes": list(estimate.hypothesis.labels),
@@ -157,6 +169,7 @@ class FitCache:
                     "chi_square": estimate.chi_square,
                     "converged": estimate.converged,
                     "given_up": estimate.given_up,
+                    "own_slopes": estimate.slopes is not None,
                     "laws": [
                         [o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws
                     ],

@@ -148,12 +148,11 @@ class HypothesisPool:
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
         slopes = {frozenset(each.labels): each.estimate.slopes for each in chosen}
-        found = self.cache(f"one law more: {_names(chosen)}", fits)
-        return [
-            replace(each, slopes=slopes[frozenset(each.hypothesis.labels)])
-            for each in found
-            if not each.given_up
-        ]
+        found = self.cache(
+            f"one law more: {_names(chosen)}", fits,
+            lambda estimate: slopes[frozenset(estimate.hypothesis.labels)],
+        )  # fmt: skip
+        return [each for each in found if not each.given_up]
 
 
 def _name(evaluated: EvaluatedHypothesis) -> str:
@@ -237,8 +236,8 @@ def _fit_beside(
         starts = [*(first if pool.small else best_start_of_each(first)), *best_start_of_each(opened)]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    found = pool.cache(f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}", fits)
-    pool.add([replace(each, slopes=base.slopes) for each in found])
+    beside = f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}"
+    pool.add(pool.cache(beside, fits, lambda estimate: base.slopes))
 
 
 def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:
