@@ -54,15 +54,14 @@ class Privileged(Controller, Protocol):
 class OneValve:
     """A controller of one valve, over a batch of n.
 
-    Its memory of a valve is a record, whose zeros mean that an episode begins. Its compiled function
-    `decide(memory, observation, constants, period)` changes memory and observation (entries,), and gives
-    the share of the coming period for which the coil is on. An accelerator's kernel calls the same.
+    Its memory of a valve is a record, whose zeros mean that an episode begins. The compiled function
+    `decide(memory, observation, constants, period)` of its file changes memory and observation
+    (entries,), and gives 1 (coil on) or 0. C is translated from what it calls.
     """
 
-    decide: ClassVar[Any]
-    """The compiled function of one valve."""
     decide_all: ClassVar[Any]
-    """The same over a batch: (memory, observations, constants, period, shares)."""
+    """`decide` over a batch: (memory, observations, constants, period, actions). Each file has its own
+    loop: numba keeps none on disk that is handed the function to call."""
     record: np.dtype
     """Of a valve's memory."""
     constants: Any
@@ -78,14 +77,10 @@ class OneValve:
 
     def act(self, observations: NDArray) -> NDArray:
         """0 (off) or 1 (on) for each valve's observation (n, entries), as (n,)."""
-        return self.shares(observations).astype(int)
-
-    def shares(self, observations: NDArray) -> NDArray:
-        """Share of the coming period with the coil on, for observations (n, entries), as (n,) [1]."""
-        shares = np.empty(len(observations))
+        actions = np.empty(len(observations), dtype=int)
         seen = np.array(observations, dtype=np.float32)
-        type(self).decide_all(self.memory, seen, self.constants, self.control_period, shares)
-        return shares
+        type(self).decide_all(self.memory, seen, self.constants, self.control_period, actions)
+        return actions
 
 
 @compiled

@@ -44,11 +44,11 @@ def decide(m, observation, p, period):
 
 def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, p, period, shares):
+    def decide_all(memory, observations, p, period, actions):
         if digest == "":
             return
         for i in range(len(memory)):
-            shares[i] = decide(memory[i], observations[i], p, period)
+            actions[i] = decide(memory[i], observations[i], p, period)
 
     return decide_all
 
@@ -75,7 +75,6 @@ class Hysteresis(OneValve):
     """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
-    decide = decide
     decide_all = _loop(DIGEST)
     record = np.dtype((np.record, [("off", np.float64)]))
 

@@ -167,7 +167,7 @@ class ValveKnowledge:
 
     def _described(self, valves: NDArray, observations: NDArray, forces: NDArray) -> NDArray:
         inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
-        seen = np.asarray(observations, dtype=np.float32)
+        seen = np.ascontiguousarray(observations, dtype=np.float32)
         _describe_all(valves, seen, self._constants, self._period, inputs, forces)
         return inputs
 

@@ -57,11 +57,11 @@ def decide(m, observation, c, period):
 
 def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, c, period, shares):
+    def decide_all(memory, observations, c, period, actions):
         if digest == "":
             return
         for i in range(len(memory)):
-            shares[i] = decide(memory[i], observations[i], c, period)
+            actions[i] = decide(memory[i], observations[i], c, period)
 
     return decide_all
 
@@ -77,7 +77,6 @@ class Policy(OneValve):
     """[s]"""
     name: str = "PPO"
     environment: str = "EPValve-v0"
-    decide = decide
     decide_all = _loop(DIGEST)
 
     def __post_init__(self) -> None:

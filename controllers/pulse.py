@@ -113,11 +113,11 @@ def decide(v, observation, c, period):
 
 def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, c, period, shares):
+    def decide_all(memory, observations, c, period, actions):
         if digest == "":
             return
         for i in range(len(memory)):
-            shares[i] = decide(memory[i], observations[i], c, period)
+            actions[i] = decide(memory[i], observations[i], c, period)
 
     return decide_all
 
@@ -125,7 +125,6 @@ def _loop(digest: str) -> Any:
 class _Pulse(OneValve):
     """Acts as `plan` advises."""
 
-    decide = decide
     decide_all = _loop(DIGEST)
     record = VALVE
 

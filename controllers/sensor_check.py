@@ -37,8 +37,8 @@ MOST_PERIODS = 65535.0
 
 CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT, "target": P2}
 """Whose ends bound each reading: a target beyond the sensor of p2 cannot be followed."""
-READINGS = len(CHANNELS)
-_P1, _P2, _P3, _I, _TARGET = range(READINGS)
+COUNT = len(CHANNELS)
+_P1, _P2, _P3, _I, _TARGET = range(COUNT)
 _ENTRIES = np.array([INDEX[name] for name in ("p1", "p2_error", "p3", "I", "target")])
 _P2_CHANGES, _P3_CHANGES = INDEX["p2_change_1"], INDEX["p3_change_1"]
 _P2_LAGS, _P3_LAGS = np.array(P2_LAGS), np.array(P3_LAGS)
@@ -53,8 +53,8 @@ SENSES = np.dtype(
     (
         np.record,
         [
-            ("now", np.float64, (READINGS,)),  # CHANNELS as read, then as held [bar, A]
-            ("last", np.float64, (READINGS,)),  # the last good ones
+            ("now", np.float64, (COUNT,)),  # CHANNELS as read, then as held [bar, A]
+            ("last", np.float64, (COUNT,)),  # the last good ones
             ("p2", np.float64, (HISTORY,)),  # held readings, the newest first [bar]
             ("p3", np.float64, (HISTORY,)),
             ("lost", np.float64),  # latest periods in a row in each of which a reading was lost
@@ -95,13 +95,13 @@ def is_good(value, ends, i):
 def hold(s, ends):
     """Put the last good readings in the place of lost ones, in `now`."""
     if s.periods == 0:
-        for i in range(READINGS):
+        for i in range(COUNT):
             s.last[i] = START[i]
         s.whole, s.fallback = HISTORY, 1.0
     s.periods = min(s.periods + 1, MOST_PERIODS)
     s.blind = 0.0 if is_good(s.now[_P2], ends, _P2) and is_good(s.now[_TARGET], ends, _TARGET) else 1.0
     lost = 0.0
-    for i in range(READINGS):
+    for i in range(COUNT):
         good = is_good(s.now[i], ends, i)
         if i == _P2 and s.blind > 0:
             good = False
@@ -168,7 +168,7 @@ def watch(s, observation, thresholds, period):
 @compiled
 def read(s, observation):
     """The readings behind an observation (entries,), into `now`."""
-    for k in range(READINGS):
+    for k in range(COUNT):
         s.now[k] = in_unit(observation, _ENTRIES[k])
     s.now[_P2] += s.now[_TARGET]  # an observation shows p2 by its distance from the target
 

@@ -121,26 +121,9 @@ def sampling_period(file: str, time: NDArray) -> float:
             f"{file}, line {line_number(0)}: {TIME_COLUMN} starts at {time[0]:g} and must start at 0: "
             "subtract the first time from all"
         )
-    steps = np.diff(time)
-    usual = float(np.median(steps))
-    backward = np.flatnonzero(steps <= 0)
-    odd = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual + 1e-9)
-    if backward.size or odd.size:
-        sample = backward[0] if backward.size else odd[0]
-        rule = f"must be uniform, in steps of {usual:g}: cut the recording there, or print more digits"
-        rule = (
-            "must increase: sort the samples, give each once, or print more digits"
-            if backward.size
-            else rule
-        )
-        raise CampaignError(
-            f"{file}, line {line_number(sample + 1)}: {TIME_COLUMN} goes from {time[sample]:.9g} to "
-            f"{time[sample + 1]:.9g} and {rule}"
-        )
-    rounding = 0.5 * last_digit(time) + HARMLESS_JITTER * usual
-    count = np.arange(
-        1, len(time)
-    )  # time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k
+    usual = _usual_step(file, time)
+    # Time k, rounded by at most h, allows (t_k - h) / k to (t_k + h) / k.
+    rounding, count = 0.5 * last_digit(time) + HARMLESS_JITTER * usual, np.arange(1, len(time))
     least, greatest = np.max((time[1:] - rounding) / count), np.min((time[1:] + rounding) / count)
     if least > greatest:
         uniform = np.linspace(0.0, time[-1], len(time))
@@ -151,6 +134,25 @@ def sampling_period(file: str, time: NDArray) -> float:
             "resample to a uniform rate"
         )
     return roundest(float(least), float(greatest))
+
+
+def _usual_step(file: str, time: NDArray) -> float:
+    """Median step of times [s]. Raises CampaignError where one goes back or skips samples."""
+    steps = np.diff(time)
+    usual = float(np.median(steps))
+    backward = np.flatnonzero(steps <= 0)
+    odd = np.flatnonzero(np.abs(steps - usual) > 0.5 * usual + 1e-9)
+    if not backward.size and not odd.size:
+        return usual
+    if backward.size:
+        sample, rule = backward[0], "increase: sort the samples, give each once, or print more digits"
+    else:
+        sample = odd[0]
+        rule = f"be uniform, in steps of {usual:g}: cut the recording there, or print more digits"
+    raise CampaignError(
+        f"{file}, line {line_number(sample + 1)}: {TIME_COLUMN} goes from {time[sample]:.9g} to "
+        f"{time[sample + 1]:.9g} and must {rule}"
+    )
 
 
 def check_rate(file: str, period: float) -> None:

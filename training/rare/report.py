@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from training.evaluation.plots import plt
 from training.rare.splitting import interval
 
-SHOWN = 40
-"""Most rare episodes of a picture."""
+SHOWN, FLOWS = 40, 3
+"""Most rare episodes of a picture, and of its panel of consumptions, where lines cover each other."""
 
 
 def tail(thresholds: Sequence[float], repetitions: Sequence[dict[str, Any]]) -> pd.DataFrame:
@@ -51,11 +51,13 @@ def rare_figure(episodes: Sequence[dict[str, Any]], duration: float) -> Figure:
     pressures.plot([e["p1_bar"] for e in shown], [e["target_bar"] for e in shown], "o", color="C0")
     pressures.set(xlabel="supply [bar]", ylabel="target [bar]", title="pressures at the start")
     time = np.linspace(0, duration, 1001)
-    for each in shown:
+    for each in shown[:: -(-len(shown) // FLOWS)]:
         flow = np.full_like(time, each["leak"])
         for start, rise, hold, fall, height in each["applications"]:
             corners = np.cumsum([start, max(rise, 1e-9), hold, max(fall, 1e-9)])
             flow += np.interp(time, corners, [0, height, height, 0])
-        flows.plot(time, 1e3 * flow, color="C0", lw=0.7, alpha=0.4)
-    flows.set(xlabel="time [s]", ylabel="consumption [g/s]", title="applications")
+        flows.plot(time, 1e3 * flow, lw=1, label=f"{each['worst_bar']:.2f} bar")
+    flows.set(xlabel="time [s]", ylabel="consumption [g/s]", title="some of them, with the excursion")
+    flows.margins(y=0.15)
+    flows.legend(loc="upper right", ncols=FLOWS)
     return drawn
