@@ -17,8 +17,11 @@ from epv_env.common.units import BAR, GRAM
 from identification.recordings.log_files import LONGEST, Drive, Log
 from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
-REST_RANGE = 0.1 * BAR
-"""Range of p3 within HOLD below which the control chamber is at rest [Pa]."""
+REST_RANGE, SETTLING = 0.1 * BAR, 0.01
+"""Range of p3 within REST below which the control chamber is at rest [Pa], and how long it may still
+settle within this range [s]: what is left falls to a third every 5 ms."""
+REST = HOLD + SETTLING
+"""Time at rest before an opening [s]."""
 
 SHUT_BEFORE, SHUT_AFTER = 0.1, 0.1
 """Longest stretches with the valve shut that belong to an opening [s]."""
@@ -177,7 +180,7 @@ def _enough(campaign: Campaign) -> Campaign:
     if len(campaign.recordings) < LEAST_OPENINGS:
         raise CampaignError(
             f"{campaign.name}: {len(campaign.recordings)} openings can be compared, too few: log "
-            f"at least {LEAST_OPENINGS}, from a valve shut for {HOLD * 1e3:g} ms, at steady consumption"
+            f"at least {LEAST_OPENINGS}, from a valve shut for {REST * 1e3:g} ms, at steady consumption"
         )
     return campaign
 
@@ -204,8 +207,8 @@ def _stretches(drive: Drive, period: float, storage: float) -> Iterator[_Stretch
 
 
 def _at_rest(drive: Drive, period: float) -> NDArray:
-    """Whether the coil has been on and p3 constant for HOLD, up to each sample; boolean (samples,)."""
-    hold = round(HOLD / period)
+    """Whether the coil has been on and p3 constant for REST, up to each sample; boolean (samples,)."""
+    hold = round(REST / period)
     if len(drive.coil) < hold:
         return np.zeros(len(drive.coil), dtype=bool)
     on = np.all(sliding_window_view(drive.coil, hold) > 0.0, axis=1)
@@ -217,9 +220,9 @@ def _stretch(
     drive: Drive, i: int, commands: NDArray, at_rest: NDArray, period: float, storage: float
 ) -> _Stretch | None:
     """The opening whose command is sample i; None where it does not end."""
-    hold, venting = round(HOLD / period), round(VENTING / period)
+    hold, venting = round(REST / period), round(VENTING / period)
     rest = i - int(np.argmin(at_rest[:i][::-1])) - (hold - 1)  # p3 has been constant since then
-    first = max(rest, i - round(SHUT_BEFORE / period), 0)
+    first = max(rest + round(SETTLING / period), i - round(SHUT_BEFORE / period), 0)
     shut = np.flatnonzero(at_rest[i : i + round(LONGEST / period)])
     if not shut.size:
         return None
