@@ -18,7 +18,7 @@ def test_a_deviating_law_changes_what_is_logged_and_none_does_not(tmp_path, monk
         return read_log(tmp_path / name).drives[0].p3
 
     none, strong = logged("none", deviation=0.0), logged("strong", deviation=0.5)
-    monkeypatch.setattr(study, "deviate", lambda valves, deviation: None)
+    monkeypatch.setattr(study, "deviate", lambda valves, deviations: None)
     plain = logged("plain")
     assert np.max(np.abs(none - plain)) < 500.0  # Pa: a reading's last digit is 10
     assert np.max(np.abs(strong - plain)) > 5e3
