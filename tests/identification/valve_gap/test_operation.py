@@ -64,6 +64,18 @@ def test_openings_begin_steady_and_know_the_leak(tmp_path):
         assert start_of(recording.name) > 0.0
 
 
+def test_openings_begin_with_the_control_chamber_settled(tmp_path):
+    env = OperationLog(gymnasium.make("EPValve-v0", scenario="none", p2_bar=8.0), tmp_path / "log")
+    env.reset(seed=1)
+    for coil in np.concatenate([np.repeat([0, 1], [10, rest]) for rest in range(20, 50)]):
+        env.step(int(coil))
+    env.close()
+    campaign, _ = openings(read_log(tmp_path / "log"), PLANT.parameters)
+    assert len(campaign.recordings) > 10
+    for recording in campaign.recordings:
+        assert abs(recording.p3[0] - np.mean(recording.p1[:8])) < 4e3  # four standard deviations
+
+
 def test_a_cause_acts_from_its_drive_on(healthy):
     log = read_log(healthy)
     campaign, steady = steady_openings(log, PLANT)
