@@ -36,8 +36,9 @@ number of standard deviations [1] together."""
 STRAIGHT = 1.5
 """Scatter of p2 about a straight line, relative to its noise, up to which consumption is steady [1]."""
 
-OPENINGS_PER_DRIVE = 20
-"""Openings of a drive that are compared, evenly over the drive."""
+OPENINGS_PER_DRIVE, DRIVES = 20, 12
+"""Openings of a drive that are compared, evenly over the drive; of each drive of a log with more than
+DRIVES fewer, so that it takes no longer."""
 
 HELD_OUT_EVERY = 3
 """Every third opening is held out."""
@@ -120,11 +121,13 @@ def evenly(campaign: Campaign, preferred: Collection[str]) -> Campaign:
     Raises CampaignError where too few are left.
     """
     chosen: list[Recording] = []
-    for _, group in groupby(campaign.recordings, key=lambda recording: drive_of(recording.name)):
-        drive = list(group)
-        first = _spread([r for r in drive if r.name in preferred], OPENINGS_PER_DRIVE)
+    groups = groupby(campaign.recordings, key=lambda recording: drive_of(recording.name))
+    every = [list(group) for _, group in groups]
+    most = _of_each(OPENINGS_PER_DRIVE, len(every))
+    for drive in every:
+        first = _spread([r for r in drive if r.name in preferred], most)
         others = [r for r in drive if r.name not in preferred]
-        first += _spread(others, OPENINGS_PER_DRIVE - len(first))
+        first += _spread(others, most - len(first))
         chosen += sorted(first, key=lambda recording: start_of(recording.name))
     roles = ("calibration",) * (HELD_OUT_EVERY - 1) + ("validation",)
     recordings = tuple(
@@ -155,8 +158,13 @@ def pauses(log: Log, p: Mapping[str, float]) -> tuple[Recording, ...]:
             continue
         none = _Flow(0.0, 1.0, 1.0)
         resting = [_recording(drive, _Stretch(i, i + length, none, none), log.period) for _, i in lowest]
-        recordings += _spread(resting, PAUSES_PER_DRIVE)
+        recordings += _spread(resting, _of_each(PAUSES_PER_DRIVE, len(log.drives)))
     return tuple(recordings)
+
+
+def _of_each(most: int, drives: int) -> int:
+    """How many of the at most `most` of a drive are taken of each."""
+    return max(most * DRIVES // max(drives, DRIVES), 1)
 
 
 def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
