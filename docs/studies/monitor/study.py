@@ -42,8 +42,8 @@ KINDS = HYSTERESIS, POLICY = "hysteresis", "policy"
 LAWS = FITTED, DEVIATING = "fitted law", "law that deviates"
 DEVIATIONS = (0.2, 0.5)
 """Range of the deviation of a law [-]."""
-VALVES, BEFORE, AFTER = 6, 4, 4
-"""Valves with each effect, and their drives without it, with it, and after it is mended."""
+VALVES, PART = 6, 4
+"""Valves with each effect, and their drives without it, with it, and after it is mended, each."""
 UNCHANGED, DRIVES = 150, 20
 """Unchanged valves of a run, and drives of each: 25 hours."""
 LEAST, MOST = 1.0, 2.0
@@ -144,12 +144,12 @@ def false_alarms(
 
 
 def detection(
-    model: MonitorModel, kind: str, law: str, valves: int
+    model: MonitorModel, kind: str, law: str, valves: int, part: int
 ) -> dict[str, dict[str, list[float] | list[bool]]]:
     """By effect, each valve's answers after it has begun with a random size, and after it is mended."""
     begun = [(name, effect, row) for name, effect, row in labels() for _ in range(valves)]
     fleet = Fleet(model, kind, len(begun), [SEED, 1])
-    for _ in range(BEFORE):
+    for _ in range(part):
         fleet.drive(fleet.parameters)
     early = [len(monitor.changes) for monitor in fleet.monitors]
     changed = [
@@ -158,11 +158,11 @@ def detection(
     ]
     drawn = fleet.rng.uniform(*DEVIATIONS, size=len(begun))
     own_law = partial(deviate, deviations=drawn.tolist()) if law == DEVIATING else lambda valves: None
-    for _ in range(AFTER):
+    for _ in range(part):
         fleet.drive(changed, begun=own_law)
     first = [m.changes[n:][:1] for m, n in zip(fleet.monitors, early, strict=True)]
     seen = [len(monitor.changes) for monitor in fleet.monitors]
-    for _ in range(AFTER):
+    for _ in range(part):
         fleet.drive(fleet.parameters)
     later = [m.changes[n:] for m, n in zip(fleet.monitors, seen, strict=True)]
     answers: dict[str, dict[str, list]] = {
@@ -172,7 +172,7 @@ def detection(
         own = answers[name]
         own["found"].append(bool(change) and not n)
         own["right"].append(bool(change) and next(iter(change[0].causes)) == effect)
-        own["late_s"].append(round(change[0].onset - BEFORE * DRIVE, 2) if change else 0.0)
+        own["late_s"].append(round(change[0].onset - part * DRIVE, 2) if change else 0.0)
         own["returned"].append(any(next(iter(c.causes)) == RETURN for c in changes))
     return answers
 
@@ -243,18 +243,18 @@ def alarm_cells(own: Sequence[dict[str, Any]]) -> list[str]:
 
 
 def tasks(
-    model: MonitorModel, runs: dict[str, int], valves: int, unchanged: int, count: int
+    model: MonitorModel, runs: dict[str, int], changed: tuple[int, int], unchanged: tuple[int, int]
 ) -> dict[str, Callable[[], dict[str, Any]]]:
-    """What to measure, by name in the journal."""
+    """What to measure, by name in the journal; valves and drives of changed and of unchanged ones."""
     found: dict[str, Callable[[], dict[str, Any]]] = {}
     for law in LAWS:
         for kind in KINDS:
-            found[f"changes, {kind}, {law}"] = partial(detection, model, kind, law, valves)
+            found[f"changes, {kind}, {law}"] = partial(detection, model, kind, law, *changed)
     for soil, own in runs.items():
         for number in range(own):
             for kind in KINDS:
                 name = f"unchanged {number}, {soil}, {kind}"
-                found[name] = partial(false_alarms, model, kind, soil, number, unchanged, count)
+                found[name] = partial(false_alarms, model, kind, soil, number, *unchanged)
     return found
 
 
@@ -262,12 +262,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     runs = dict.fromkeys(RUNS, 1) if options.quick else RUNS
-    valves, unchanged, count = (1, 8, 1) if options.quick else (VALVES, UNCHANGED, DRIVES)
-    subject = {"seed": SEED, "valves": VALVES, "quick": options.quick}
+    changed, unchanged = ((1, 1), (8, 1)) if options.quick else ((VALVES, PART), (UNCHANGED, DRIVES))
+    subject = {"seed": SEED, "changed": changed, "unchanged": unchanged}
     journal = Journal(options.out / "results.jsonl", subject)
     missing = {
         name: task
-        for name, task in tasks(MonitorModel.load(SHIPPED), runs, valves, unchanged, count).items()
+        for name, task in tasks(MonitorModel.load(SHIPPED), runs, changed, unchanged).items()
         if name not in journal
     }
     for name in progress(missing, what="monitor"):
