@@ -76,16 +76,17 @@ def test_openings_begin_with_the_control_chamber_settled(tmp_path):
         assert abs(recording.p3[0] - np.mean(recording.p1[:8])) < 4e3  # four standard deviations
 
 
-def test_a_cause_acts_from_its_drive_on(healthy):
+@pytest.mark.parametrize(("symbol", "size"), [("G_eddy", 0.004), ("theta_coil", 20.0)])
+def test_a_cause_acts_from_its_drive_on(symbol, size, healthy):
     log = read_log(healthy)
     campaign, steady = steady_openings(log, PLANT)
     whole = LoggedValve(campaign, PLANT, steady)
     late = whole.acting_in({c.label: Span(1, 2, 1.0, False) for c in whole.causes})
     runs = range(len(whole.runs))
-    acting = {"G_eddy": np.array([0.004])}
+    acting = {symbol: np.array([size])}
     none, every, second = (
         plant.outputs(values, runs)
-        for plant, values in ((whole, {"G_eddy": np.zeros(1)}), (whole, acting), (late, acting))
+        for plant, values in ((whole, {symbol: np.zeros(1)}), (whole, acting), (late, acting))
     )
     for run, without, both, one in zip(whole.runs, none, every, second, strict=True):
         np.testing.assert_array_equal(one, both if run.name.startswith("drive-2") else without)
