@@ -7,6 +7,8 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -215,18 +217,34 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
 
 
 def test_a_diagnosis_that_differs_is_explained() -> None:
-    content = {"verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None}
+    content: dict[str, Any] = {
+        "verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None,
+        "causes": [], "levels": {"form": {}},
+    }  # fmt: skip
+    log: Any = SimpleNamespace(drives=[SimpleNamespace(file=f"drive-{k}.csv") for k in (1, 2)])
     monitor = Monitor(white_model())
-    assert "agrees: no_gap" in agreement(monitor, content)
+
+    def said() -> str:
+        return agreement(monitor, log, [50.0, 100.0], content)
+
+    assert said() == "The diagnosis agrees: no_gap."
     monitor._log[1] = 50.0
-    assert "second (no_gap): the valve differs from the start on" in agreement(monitor, content)
+    assert "does not name second, by which the valve differs from the start on" in said()
     monitor._since[1] = 60.0
-    assert "second (no_gap): this effect is absorbed" in agreement(monitor, content)
-    content["ambiguity_set"] = [["second"], ["third"]]
-    assert "agrees" in agreement(monitor, content)
+    assert "does not name second, which recalibration" in said()
+    content |= {"ambiguity_set": [["second"]], "verdict": "known"}
+    assert "has second begin in drive-1.csv, not drive-2.csv" in said()
+    content["causes"] = [{"effects": ["second"], "onset": {"second (x)": {"drive": "drive-2.csv"}}}]
+    assert said() == "The diagnosis agrees: known."
+    content["ambiguity_set"] = [["first"]]
+    assert "names first, which acts in all drives" in said()
+    content |= {"absorbed": [], "onset": {"drive": "drive-2.csv"}}
+    assert "names first, where the monitor names what looks alike" in said()
+    assert "does not name second, which looks like what it names" in said()
     content["ambiguity_set"] = [["third"]]
-    assert "names third: it simulates every effect" in agreement(monitor, content)
-    assert "hardly shows" in agreement(Monitor(white_model()), content)
+    assert "names third, which hardly shows" in said()
+    content["ambiguity_set"] = []
+    assert "does not name second, since it allows for a misfit" in said()
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:
