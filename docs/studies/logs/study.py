@@ -160,13 +160,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--valves", type=COUNT, default=VALVES)
     options = study_options(parser, arguments)
     numbers, drives = ([2], QUICK) if options.quick else (range(options.valves), DRIVES)
-    journal = Journal(options.out / "valves.jsonl", {"seed": SEED, "drives": drives})
+    subject = {"seed": SEED, "drives": drives, "effects": [effect.name for effect in EFFECTS]}
+    journal, answers = Journal(options.out / "valves.jsonl", subject), []
     for number in numbers:
         if str(number) not in journal:
             journal.add(str(number), answer(drawn(number, drives), options.work / str(number)))
             print(number, journal[str(number)], flush=True)
-    answers = [journal[str(number)] for number in numbers]
-    fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
+        answers.append(journal[str(number)])
+        fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
     return 0
 
 
