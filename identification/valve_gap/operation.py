@@ -146,19 +146,29 @@ def _in_its_drives(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosi
 
 
 def _span_by_refits(valve: "LoggedValve", spans: Mapping[str, Span], found: Diagnosis) -> Span:
-    """The likeliest drives of the best cause, which is a single one, by a fit in each span."""
+    """The likeliest drives of the best cause, which is a single one, by a fit in each of some spans.
+
+    These are all that last to the end, then those that begin with the best of them: as many as drives.
+    """
     problem, estimate = found.ranking.problem, found.best.hypothesis.estimate  # type: ignore[union-attr]
     (cause,) = estimate.hypothesis.causes
     if cause.label in valve.lasting and not cause.run_parameters:
         return spans[cause.label]  # a parameter off its value
-    every = list(combinations(range(len(valve.drives) + 1), 2))
-    squares = []
-    for span in every:
+    count = len(valve.drives)
+    squares = dict.fromkeys(combinations(range(count + 1), 2), np.inf)
+
+    def refit(span: tuple[int, int]) -> None:
         plant = copy(prepared(problem.plant))
         plant.plant = valve.acting_in({**spans, cause.label: Span(*span, 1.0, False)})
         narrowed = FittingProblem(plant, problem.slopes, thorough=problem.thorough)
-        squares.append(fit(narrowed, [restarted(estimate)], iterations=3)[0].chi_square)
-    return likeliest_span(np.array(squares), every, len(valve.drives), problem.readings)
+        squares[span] = fit(narrowed, [restarted(estimate)], iterations=3)[0].chi_square
+
+    for start in range(count):
+        refit((start, count))
+    first, _ = min(squares, key=lambda span: squares[span])
+    for end in range(first + 1, count):
+        refit((first, end))
+    return likeliest_span(np.array([*squares.values()]), [*squares], count, problem.readings)
 
 
 def as_consumption(
