@@ -23,10 +23,7 @@ FORBIDDEN = {
 }  # fmt: skip
 """What the files of a folder do not import."""
 
-ALLOWED = {
-    "epv_env/common": ("epv_env.common",),
-    "epv_env/plant": ("epv_env.plant", "epv_env.common"),
-}
+ALLOWED = {"epv_env/common": ("epv_env.common",), "epv_env/plant": ("epv_env.plant", "epv_env.common")}
 """What they may import all the same."""
 
 

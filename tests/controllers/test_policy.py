@@ -12,13 +12,7 @@ from safetensors.numpy import load_file, save_file
 from controllers.knowledge import READINGS
 from controllers.network import Network
 from controllers.policy import TRAINED, Policy, load_policy
-from controllers.policy_files import (
-    CONTRACT_FILE,
-    WEIGHTS_FILE,
-    PolicyError,
-    read_policy,
-    write_policy,
-)
+from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, PolicyError, read_policy, write_policy
 from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes

@@ -30,9 +30,7 @@ def test_the_operating_duty_nearly_holds_p3_in_the_full_simulation(plant):
     """Switched with the design's duty, the simulated valve's p3 settles near the operating point."""
     point = linearise(plant, p1=P1, p2=P2)
     duty = design(plant, **SHAPE).duty
-    valves = Valves(1, threads=1)
-    for field, value in zip(valves.state, energised(plant, p1=P1, p2=P2, U=24.0), strict=True):
-        field[:] = value
+    valves = Valves.started(1, plant, energised(plant, p1=P1, p2=P2, U=24.0), threads=1)
     valves.state.p3[:] = point.p3
     mean = []
     for _ in range(60):

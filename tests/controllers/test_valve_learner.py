@@ -17,7 +17,6 @@ from controllers.valve_learner import (
     VALVE,
 )
 from epv_env.common.units import BAR
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
@@ -125,13 +124,8 @@ def test_a_batch_is_learnt_as_its_valves_alone_to_the_bit():
 def test_the_reserve_is_what_the_hardest_application_draws_beyond_what_is_tolerated(table):
     """From rest, with the hardest application as the coil is switched off, until the piston lifts."""
     p1, p2, step = 11.0 * BAR, 8.0 * BAR, 0.1e-3
-    valves = Valves(1, threads=1)
-    valves.set_parameters(np.array([0]), Parameters.calibrated())
-    for field, value in zip(
-        valves.state, energised(Parameters.calibrated(), p1=p1, p2=p2, U=24.0), strict=True
-    ):
-        field[:] = value
-    valves.inputs.U[:] = 0.0
+    nominal = PLANT.parameters
+    valves = Valves.started(1, nominal, energised(nominal, p1=p1, p2=p2, U=24.0), threads=1)
     valves.inputs.sigma_S[:] = HARDEST_FLOW
     while valves.state.xPV[0] == 0:
         valves.advance(step)

@@ -29,10 +29,7 @@ def test_the_layout_names_measured_quantities_only():
 
 @pytest.mark.parametrize(
     ("identifier", "supply", "target"),
-    [
-        ("EPValve-v0", (2.0, 16.0), 2.0),
-        ("EPValvePWM-v0", 16.0, (2.0, 16.0)),
-    ],
+    [("EPValve-v0", (2.0, 16.0), 2.0), ("EPValvePWM-v0", 16.0, (2.0, 16.0))],
     ids=str,
 )
 def test_observations_stay_in_their_space_under_extremes(identifier, supply, target):

@@ -19,7 +19,7 @@ RESERVOIR = 0.02  # m^3, small so that it sags
 
 
 @cache
-def switched_at_random(restitution=0.0, reservoir=RESERVOIR):
+def switched_at_random(restitution=0.0):
     """N valves for 1 s under random switching, consumption and refill.
 
     Returns (parameters, states at the borders of the periods, inputs); fields of shape
@@ -27,10 +27,7 @@ def switched_at_random(restitution=0.0, reservoir=RESERVOIR):
     """
     rng = np.random.default_rng(1)
     p = CALIBRATED.replace(eMV=restitution, ePV=restitution)
-    valves = Valves(N)
-    valves.set_parameters(np.arange(N), p, reservoir)
-    for field, value in zip(valves.state, energised(p, p1=12e5, p2=6e5, U=24.0), strict=True):
-        field[:] = value
+    valves = Valves.started(N, p, energised(p, p1=12e5, p2=6e5, U=24.0), reservoir_volume=RESERVOIR)
     start = [field.copy() for field in valves.state]
     switches = rng.random((PERIODS, N)) < 0.08
     inputs = Inputs(
@@ -89,11 +86,8 @@ def test_movers_stay_between_their_stops(restitution):
 
 def test_coil_energy_is_the_integral_of_electrical_power():
     fine = 50e-6
-    valves = Valves(1)
-    valves.set_parameters(np.arange(1), CALIBRATED)
     start = energised(CALIBRATED, p1=12e5, p2=6e5, U=0.0)._replace(xMV=0.0, p3=1e5)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
+    valves = Valves.started(1, CALIBRATED, start)
     U = np.full((400, 1), 24.0)
     q = valves.record(Inputs(U, *np.zeros((3, 1, 1))), fine)
     power = 24.0 * np.append(start.I, q.I)

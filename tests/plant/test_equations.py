@@ -87,10 +87,7 @@ def test_coil_current_rises_exponentially_while_the_armature_is_held():
 @numba.njit
 def _magnet(q, u, c, e):
     inverse_Rm = reluctance_inverse(q, c)
-    return (
-        current_rate(q, u, c, inverse_Rm, e, False),
-        armature_force(q, c, inverse_Rm, e, False),
-    )
+    return (current_rate(q, u, c, inverse_Rm, e, False), armature_force(q, c, inverse_Rm, e, False))
 
 
 def _magnet_powers(p, q, u, printed):

@@ -3,11 +3,7 @@
 import numpy as np
 import pytest
 
-from epv_env.plant.parameters import (
-    ParameterError,
-    Parameters,
-    table,
-)
+from epv_env.plant.parameters import ParameterError, Parameters, table
 
 TABLE_5 = {"kappa": 1.4, "mu0": 4e-7 * np.pi, "R_gas": 287.14}
 TABLE_6 = {

@@ -21,12 +21,7 @@ def test_agrees_with_another_implementation(name):
     p1, p = run["p1_bar"] * BAR, Parameters.calibrated()
     start = energised(p, p1=p1[0], p2=run["p2_bar"][0] * BAR, U=run["U_V"][0])
     found = simulate(
-        p,
-        initial=start,
-        U=run["U_V"],
-        period=run["time_s"][1],
-        sigma_S=run["sigmaS_kg_per_s"],
-        p1=p1,
+        p, initial=start, U=run["U_V"], period=run["time_s"][1], sigma_S=run["sigmaS_kg_per_s"], p1=p1
     ).state
     moving = (run["xMV_mm"] > 0) & (run["xMV_mm"] < p["xMVmax"] / MILLIMETRE)
     assert np.max(np.abs(found.p2 / BAR - run["p2_bar"])) < 1e-3

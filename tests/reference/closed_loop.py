@@ -62,28 +62,21 @@ def random_schedules(n: int, seed: int) -> list[Schedule]:
     )
     initial = [energised(p, p1=at, p2=6.5e5, U=U_ON) for p, at in zip(parameters, p1, strict=True)]
     U = _controlled(parameters, initial, imposed)
+    borders = np.arange(decisions + 1) * PERIOD
     return [
         piecewise_schedule(
-            parameters[k],
-            initial[k],
-            np.arange(decisions + 1) * PERIOD,
-            U=U[:, k],
-            sigma_S=imposed.sigma_S[:, k],
+            parameters[k], initial[k], borders, U=U[:, k], sigma_S=imposed.sigma_S[:, k],
             p1_slope=imposed.p1_slope[:, k],
         )
         for k in range(n)
-    ]
+    ]  # fmt: skip
 
 
 def _controlled(parameters: list[Parameters], initial: list[State], imposed: Disturbances) -> NDArray:
     """Voltages that the controller chooses [V], shape (decisions, valves)."""
     n = len(parameters)
-    valves = Valves(n, threads=1)
-    valves.set_parameters(
-        np.arange(n), {key: np.array([p[key] for p in parameters]) for key in parameters[0]}
-    )
-    for field, values in zip(valves.state, zip(*initial, strict=True), strict=True):
-        field[:] = values
+    every = {key: np.array([p[key] for p in parameters]) for key in parameters[0]}
+    valves = Valves.started(n, every, State(*zip(*initial, strict=True)), threads=1)
     U = np.full(imposed.target.shape, U_ON)
     previous = valves.state.p2.copy()
     for k, target in enumerate(imposed.target):

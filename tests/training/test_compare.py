@@ -62,14 +62,7 @@ def test_a_restart_makes_the_controller_forget_once_at_its_time():
 
 def test_batches_hold_the_episodes_of_one_run(monkeypatch):
     options = {"plant": PLANT, "scenario": "steps"}
-    whole = Batch(
-        name="w",
-        controller="good",
-        first_seed=5,
-        episodes=5,
-        duration=0.8,
-        options=options,
-    )
+    whole = Batch(name="w", controller="good", first_seed=5, episodes=5, duration=0.8, options=options)
     (at_once,) = run_batches([whole], {"good": GOOD}, what="test")
     monkeypatch.setattr(batches, "BATCH_EPISODES", 2)
     assert [part.episodes for part in in_batches(whole)] == [2, 2, 1]

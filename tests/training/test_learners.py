@@ -25,11 +25,7 @@ from training.commands.train import sentence_of
 from training.evaluation.metrics import EpisodeMetrics
 from training.learners import ppo
 from training.learners.actor import network_of
-from training.learners.environment import (
-    REWARD_SCALE,
-    make_training_env,
-    training_weights,
-)
+from training.learners.environment import REWARD_SCALE, make_training_env, training_weights
 from training.learners.ppo import Task, checkpoints, make_model, read_rows, score, train
 
 pytestmark = pytest.mark.training

@@ -18,12 +18,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.settings import make_settings
-from training.studies.sweep_designs import (
-    ONE_AT_A_TIME,
-    chosen_points,
-    parameters,
-    regions,
-)
+from training.studies.sweep_designs import ONE_AT_A_TIME, chosen_points, parameters, regions
 from training.studies.sweep_report import harmful_changes, share_figure
 
 pytestmark = pytest.mark.training

@@ -5,10 +5,7 @@ import pytest
 
 from epv_env.plant.channels import SENSORS
 from identification.bench.programmes import DIAGNOSIS_SUITE
-from identification.bench.session import (
-    measured_campaign,
-    measured_recording,
-)
+from identification.bench.session import measured_campaign, measured_recording
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import CHANNELS, UNITS
 from tests.identification.twins import REPORT, TRUE, truth, twin

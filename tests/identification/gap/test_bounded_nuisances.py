@@ -11,9 +11,7 @@ from identification.gap.fit.evidence import evaluate
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gauss_newton import linearise
 from identification.gap.fit.recalibration import recalibrate
-from identification.gap.fit.variable_projection import (
-    without_run_nuisances,
-)
+from identification.gap.fit.variable_projection import without_run_nuisances
 
 SD = 5e-4
 """Of the gauge's zero in a run [m]."""

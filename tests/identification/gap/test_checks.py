@@ -82,10 +82,7 @@ C, LEAK = Described().parameters[0], Described().causes[0]
 TIME = 0.5 * np.arange(240)
 
 MISTAKES: dict[str, tuple[Callable[[], Tank], str]] = {
-    "no noise": (
-        lambda: with_channel(noise=0.0),
-        r"channels, h: noise 0 is not positive.*leave it out",
-    ),
+    "no noise": (lambda: with_channel(noise=0.0), r"channels, h: noise 0 is not positive.*leave it out"),
     "names of runs": (
         lambda: Described(runs=(*runs(True), *runs(False))),
         "runs: two are named test_1.*rename",

@@ -10,10 +10,7 @@ from identification.gap.fit.evidence import percentage_errors, predict
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.recalibration import recalibrate
-from identification.gap.judge.held_out import (
-    DiscrepancyReduction,
-    measure_discrepancy_reduction,
-)
+from identification.gap.judge.held_out import DiscrepancyReduction, measure_discrepancy_reduction
 
 
 def estimates(tank: Tank, causes: tuple[str, ...]) -> tuple[FittingProblem, dict[str, Estimate]]:

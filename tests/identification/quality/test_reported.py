@@ -4,12 +4,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from docs.studies.reproduction.errata import (
-    SAMPLES,
-    STATISTICS,
-    TREND_OFFSETS,
-    TREND_SLOPES,
-)
+from docs.studies.reproduction.errata import SAMPLES, STATISTICS, TREND_OFFSETS, TREND_SLOPES
 from epv_env.plant.channels import SENSORS
 from identification.recordings.recording import CHANNELS
 

@@ -3,10 +3,7 @@
 import numpy as np
 import pytest
 
-from identification.quality.channel import (
-    descriptive_statistics,
-    run_limit,
-)
+from identification.quality.channel import descriptive_statistics, run_limit
 from identification.recordings.recording_checks import longest_run
 
 TIME = np.arange(10_000) / 2000

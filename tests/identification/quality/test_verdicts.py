@@ -11,13 +11,7 @@ from epv_env.plant.channels import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets, white_noise_band
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
-from tests.identification.quality.records import (
-    AMBIENT,
-    PERIOD,
-    readings,
-    rest_record,
-    with_channel,
-)
+from tests.identification.quality.records import AMBIENT, PERIOD, readings, rest_record, with_channel
 
 SAMPLES = 10_000
 TIME = np.arange(SAMPLES) * PERIOD

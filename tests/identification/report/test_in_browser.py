@@ -4,15 +4,7 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
-from identification.report.page import (
-    ANSWERS,
-    LABELS,
-    Picture,
-    Section,
-    Table,
-    Verdict,
-    write_page,
-)
+from identification.report.page import ANSWERS, LABELS, Picture, Section, Table, Verdict, write_page
 from tests.identification.browser import (
     DESK,
     PHONE,

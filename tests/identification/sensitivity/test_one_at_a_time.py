@@ -6,11 +6,7 @@ import pytest
 
 from epv_env.plant.parameters import Parameters, table
 from identification.report_2003 import printed_sensitivities
-from identification.sensitivity.one_at_a_time import (
-    changed_values,
-    sensitivities,
-    studied_symbols,
-)
+from identification.sensitivity.one_at_a_time import changed_values, sensitivities, studied_symbols
 
 PNEUMATIC = (
     "dMVexh", "R", "alphaMV", "V3", "cPV", "alphaPV", "V2", "dMVin", "d1", "d2", "xPV0", "xPVmax",

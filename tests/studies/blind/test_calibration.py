@@ -3,13 +3,7 @@
 import numpy as np
 import pytest
 
-from docs.studies.blind.score import (
-    FIRST,
-    INCLUSION,
-    answers,
-    expected_calibration_error,
-    score_trial,
-)
+from docs.studies.blind.score import FIRST, INCLUSION, answers, expected_calibration_error, score_trial
 from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
 
 

@@ -2,13 +2,7 @@
 
 import pytest
 
-from docs.studies.blind.score import (
-    figures,
-    is_correct,
-    is_tied,
-    score_trial,
-    share,
-)
+from docs.studies.blind.score import figures, is_correct, is_tied, score_trial, share
 from docs.studies.blind.study import AT_LEAST, AT_MOST, rows
 from docs.studies.blind.truth import ABSORBED
 from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
