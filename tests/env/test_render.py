@@ -2,15 +2,12 @@
 
 import copy
 import pickle
-import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.wrappers import RecordVideo
 from numpy.typing import NDArray
 
 from epv_env.render import Renderer, Snapshot, canvas, geometry, strip, window
@@ -140,32 +137,11 @@ def test_drawing_goes_on_without_a_window_that_the_user_shut() -> None:
     renderer.close()
 
 
-def test_an_episode_is_filmed(tmp_path: Path) -> None:
-    pytest.importorskip("moviepy", reason="needs the extra 'video'")
-    env = gymnasium.make("EPValve-v0", render_mode="rgb_array", max_episode_steps=10)
-    film = RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
-    film.reset(seed=0)
-    for _ in range(10):
-        film.step(1)
-    film.close()
-    assert [path.stat().st_size > 1000 for path in tmp_path.glob("*.mp4")] == [True]
-
-
 def test_without_pygame_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     renderer = Renderer("rgb_array", fps=60)
     with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install -e '\.\[render\]'"):
         renderer.draw(SHUT)
-
-
-def test_importing_the_renderer_imports_no_graphics() -> None:
-    code = (
-        "import sys, epv_env.render\n"
-        "loaded = {'pygame', 'matplotlib'} & set(sys.modules)\n"
-        "assert not loaded, loaded\n"
-    )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert result.returncode == 0, result.stderr
 
 
 def test_the_first_picture_shows_what_has_been() -> None:

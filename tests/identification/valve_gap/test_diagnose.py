@@ -20,7 +20,6 @@ from identification.recordings.campaign_files import read_campaign, write_campai
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.valve_gap.diagnose import diagnose_campaign, possible_plants, subject
 from identification.valve_gap.valve import Valve
-from tests.identification.browser import check_layout
 from tests.identification.valve_gap.small_catalogue import LEFT_OUT
 
 NAMES = ("test1", "low_supply", "validation")
@@ -70,14 +69,12 @@ def test_finished_fits_belong_to_the_whole_plant_and_its_surroundings():
     assert all(first != each for each in rest)
 
 
-def test_its_report_has_words_for_equations_and_parameters(diagnosed, tmp_path):
-    path = diagnosed / "out" / "report.html"
-    page = path.read_text()
+def test_its_report_has_words_for_equations_and_parameters(diagnosed):
+    page = (diagnosed / "out" / "report.html").read_text()
     assert "voltage balance of the coil" in page
     assert "resistance of the solenoid (R)" in page
     assert "eddy current in the solenoid&#39;s iron (eddy_current)" in page
     assert not re.search(r"(?<![(\w])(eddy_current|parameter:)", page)
-    check_layout(path, tmp_path)
 
 
 def test_its_plant_file_goes_into_the_environment(diagnosed):
