@@ -11,8 +11,8 @@ import pandas as pd
 from identification.importing.import_campaign import LARGEST_FILE
 from identification.importing.source_file import LONGEST_NAME, MOST_CHANNELS
 from identification.recordings.recording import Recording
-from tests.identification.importing.dialects import columns_of, text
-from tests.identification.importing.timed_files import channels_of, frame, mat5
+from tests.identification.importing.dialects import columns_of, mat5, named, text
+from tests.identification.importing.timed_files import channels_of, frame
 
 
 def rows(
@@ -84,8 +84,8 @@ def struct_array(true: Recording) -> dict[str, Any]:
 
 
 def interval(true: Recording) -> dict[str, Any]:
-    named = {f"{name}_{unit}": values for name, (values, unit) in channels_of(true).items()}
-    return {"Tstart": -0.02, "Tinterval": true.period, "Length": float(len(true)), **named}
+    length = {"Tstart": -0.02, "Tinterval": true.period, "Length": float(len(true))}
+    return length | named(channels_of(true))
 
 
 def written(at: Path, content: str) -> Path:

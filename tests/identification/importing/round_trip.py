@@ -1,12 +1,23 @@
-"""Whether an imported campaign is the one that the files were made from."""
+"""A campaign of the virtual bench, and whether an imported one is the same."""
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 
+from epv_env.plant.parameters import Parameters
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
 from identification.importing.import_campaign import ImportedCampaign, read_files
 from identification.recordings.campaign_files import write_campaign
 from identification.recordings.recording import CHANNELS, Campaign
+
+
+@cache
+def bench() -> Campaign:
+    """A test, the validation and the record at rest."""
+    suite = (REPORT_SUITE[0], REPORT_SUITE[-2], REPORT_SUITE[-1])
+    return run_bench(suite, Parameters.calibrated(), seed=11)
 
 
 def assert_same_recordings(made: Campaign, true: Campaign) -> None:
