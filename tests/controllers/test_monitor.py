@@ -140,17 +140,6 @@ def test_the_log_of_a_drive_has_openings(tmp_path) -> None:
     assert len(monitor.history) >= 3
 
 
-@pytest.mark.parametrize(("channel", "value"), [(4, np.nan), (2, np.inf), (1, 0.0)])
-def test_an_opening_with_a_missing_reading_does_not_count(channel, value) -> None:
-    plant = Plant.calibrated()
-    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
-    drive = drives(plant, controller, [3], {}, duration=10.0)[0]
-    drive[30::60, channel] = value
-    reader = OpeningReader()
-    found = [opening for opening in map(reader.update, drive.tolist()) if opening is not None]
-    assert all(np.all(np.isfinite(z)) for _, z in found)
-
-
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
 def test_c_code_says_what_python_says(tmp_path: Path) -> None:
     plant = Plant.calibrated()

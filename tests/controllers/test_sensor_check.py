@@ -120,14 +120,8 @@ def test_only_a_reading_that_stands_still_against_the_coil_is_implausible(values
 
 def test_the_first_observations_are_believed():
     check = Check(periods=0)
-    assert [check.act(seen(p3_change_4=0.0, since_switching=0.025)) for _ in range(6)] == [
-        0,
-        0,
-        0,
-        0,
-        1,
-        1,
-    ]
+    actions = [check.act(seen(p3_change_4=0.0, since_switching=0.025)) for _ in range(6)]
+    assert actions == [0] * 4 + [1] * 2
 
 
 @pytest.mark.parametrize("value", [0.0, np.nan, np.inf, 1e308])

@@ -55,17 +55,6 @@ def test_a_frame_is_an_rgb_image() -> None:
     assert image.std() > 20.0
 
 
-def test_nothing_of_the_last_frame_is_left() -> None:
-    """A frame depends on its snapshot only, once the history is forgotten."""
-    pytest.importorskip("pygame")
-    renderer = Renderer("rgb_array", fps=60)
-    renderer.draw(replace(OPEN, p2_bar=12.34, sigma_S_g_per_s=33.33, time_s=12345.678))
-    renderer.reset()
-    image = renderer.draw(SHUT)
-    assert image is not None
-    assert np.array_equal(image, frame(SHUT))
-
-
 def test_the_piston_lifts_by_its_stroke() -> None:
     lift = geometry.movers(SHUT).piston_bottom - geometry.movers(OPEN).piston_bottom
     assert lift == geometry.STROKE_PV

@@ -45,15 +45,6 @@ def test_effects_of_one_episode_replace_the_constructors():
     assert column(env, "G_eddy")[0] == 0.004
 
 
-@pytest.mark.parametrize("name", ["threads", "max_episode_steps", "num_envs"])
-@pytest.mark.parametrize("value", [0, 1.5, True])
-def test_counts_are_whole_numbers_of_at_least_one(name, value):
-    from epv_env.vector_env import EPValveVectorEnv
-
-    with pytest.raises(ValueError, match=f"{name} = .*: give a whole number"):
-        EPValveVectorEnv(**{"num_envs": 2, name: value})
-
-
 def test_each_sub_environment_may_have_a_length_of_its_own():
     lengths = [2, 3, 5]
     env = gymnasium.make_vec(

@@ -155,45 +155,6 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
     assert "No record at rest shows the sensors" in page
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["bench", "--set", "R=abc"], "give SYMBOL=VALUE with a number"),
-        (["bench", "--set", "R"], "give SYMBOL=VALUE with a number"),
-        (["bench", "--set", "Q=3"], "unknown parameter 'Q'"),
-        (["bench", "--set", "R=1"], "outside its domain"),
-        (["bench", "--effect", "gremlins=1"], "unknown effect; known are"),
-        (["bench", "--effect", "local_gas_speed=0.1"], "sized by a1, a2"),
-        (["bench", "--effect", "circuit_leak=x"], "--effect circuit_leak=x: give NAME=SIZE with a"),
-        (["bench", "--effect", "circuit_leak=1"], "outside its domain"),
-        (["bench", "--rate", "100"], "sampling rate 100"),
-        (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
-        (["run", "/no/campaign"], "cannot read"),
-    ],
-)
-def test_a_wrong_value_is_refused_in_one_sentence(arguments, message, tmp_path, capsys):
-    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["run", "campaign", "--starts", "0"],
-        ["run", "campaign", "--stage", "none"],
-        ["bench", "--seed", "-1"],
-        ["bench", "--suite", "none"],
-    ],
-)
-def test_a_wrong_option_is_refused_with_the_usage(arguments, tmp_path, capsys):
-    with pytest.raises(SystemExit) as refusal:
-        main([*arguments, "--out", str(tmp_path / "out")])
-    assert refusal.value.code == 2
-    assert "error:" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_bench_does_not_write_over_a_campaign(campaign, capsys):
     before = (campaign / "test1.csv").read_bytes()
     assert main(["bench", "--out", str(campaign), "--seed", "4"]) == 2

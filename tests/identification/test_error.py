@@ -26,14 +26,6 @@ def test_a_sine_of_error_is_its_effective_value():
     assert error == pytest.approx(1 / np.sqrt(2) / 4, rel=1e-6)
 
 
-def test_variants_are_columns():
-    reference = 5.0 + TIME
-    both = np.stack([reference, 1.1 * reference], axis=1)
-    errors = relative_error(reference, both, TIME)
-    assert errors[0] == 0.0
-    assert errors[1] == pytest.approx(relative_error(reference, both[:, 1], TIME), rel=1e-12)
-
-
 def test_table_11_s_partial_errors_and_total_come_from_its_columns():
     """Test1's row of Table 11, and the total over its four partial errors [%]."""
     assert partial_error([np.array(e) for e in (1.7241, 1.9783, 6.5588)]) == pytest.approx(

@@ -15,7 +15,7 @@ from docs.studies.reproduction.sensitivity_tables import (
     run_one_at_a_time,
 )
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.simulate import SimulationError, energised, simulate
+from epv_env.plant.simulate import energised, simulate
 from identification.report_2003 import CALIBRATION_CASES
 
 pytestmark = pytest.mark.slow
@@ -52,12 +52,6 @@ def test_the_short_form_gives_the_published_tables(tmp_path, monkeypatch):
     assert {path.name for path in tmp_path.glob("*.png")} == {"calibration.png"}
 
 
-def test_exact_stops_reproduce_fewer():
-    met = agreement_with_printed(one_at_a_time().exact)
-    assert met.reproduced >= 33
-    assert met.classes_differ == ("RML",)
-
-
 def test_another_class_is_noticed():
     rows = dict(one_at_a_time().fixed_step)
     rows["d1"] = replace(rows["d1"], minus=0.001, plus=0.001)
@@ -89,10 +83,3 @@ def test_rows_that_leave_the_armature_alone_carry_no_scatter(symbol):
     """No pressure acts on the armature, so its scatter is the same in both runs and cancels."""
     scatter = one_at_a_time().scatter[symbol]
     assert np.ptp(scatter, axis=0).max() < 0.03 * scatter.mean()
-
-
-def test_a_step_that_is_too_long_is_refused():
-    p = Parameters.nominal().replace(kMV=10.0, mMV=0.001)
-    start = energised(p, p1=12.5e5, p2=6.8e5, U=18.9)
-    with np.errstate(all="ignore"), pytest.raises(SimulationError, match="shorter"):
-        simulate_fixed_step(p, initial=start, U=np.tile([0.0, 18.9], 200), period=5e-2)

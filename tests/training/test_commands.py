@@ -84,23 +84,3 @@ def test_a_finished_run_is_not_overwritten_unasked(finished):
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "holds a training: give --resume" in result.stderr
     assert (out / "policy.safetensors").read_bytes() == before
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
-        (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
-        (["--parameters", "diagnosis"], "has no alternatives to draw from"),
-        (["--timesteps", "0"], "--timesteps"),
-        (["--switching-price", "-1"], "must be a number from 0 to 1000"),
-        (["--resume"], "nothing to resume"),
-    ],
-)
-def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):
-    out = tmp_path / "out"
-    result = train("--quick", *arguments, "--out", out)
-    assert result.returncode == 2
-    assert words in result.stderr
-    assert "Traceback" not in result.stderr
-    assert not (out / "config.json").exists()

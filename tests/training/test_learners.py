@@ -22,11 +22,10 @@ from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import sentence_of
-from training.evaluation.metrics import EpisodeMetrics
 from training.learners import ppo
 from training.learners.actor import network_of
 from training.learners.environment import REWARD_SCALE, make_training_env, training_weights
-from training.learners.ppo import Task, checkpoints, make_model, read_rows, score, train
+from training.learners.ppo import Task, checkpoints, make_model, read_rows, train
 
 pytestmark = pytest.mark.training
 TASK = Task(plant=Plant.calibrated())
@@ -77,19 +76,6 @@ def test_rewards_are_scaled_and_the_monitor_counts_them_as_they_are(env):
     i = ended[0]
     assert infos[i]["episode"]["r"] * REWARD_SCALE == pytest.approx(total[i], rel=1e-3)
     assert infos[i]["terminal_observation"].shape == env.observation_space.shape
-
-
-def metrics(returns, stayed) -> EpisodeMetrics:
-    """Metrics of which only return and staying count."""
-    names = EpisodeMetrics.__dataclass_fields__
-    zeros = {name: np.zeros(len(returns)) for name in names}
-    given = {"episode_return": np.array(returns), "stayed": np.array(stayed)}
-    return EpisodeMetrics(**{**zeros, **given})
-
-
-def test_an_episode_that_leaves_costs_more_than_a_good_one_loses():
-    good, leaving = metrics([-150.0] * 4, [True] * 4), metrics([-120.0] * 4, [True, True, True, False])
-    assert score(good) > score(leaving)
 
 
 def stop(course: ppo.Course) -> bool:

@@ -24,19 +24,3 @@ def test_an_effect_acts_from_its_drive_on(tmp_path):
     np.testing.assert_array_equal(same[0], other[0])
     assert len(same[1]) == len(other[1]) == 200
     assert np.any(same[1] != other[1])
-
-
-@pytest.mark.parametrize(
-    ("words", "message"),
-    [
-        (["--controller", "PWM"], "'PWM' cannot have written a log"),
-        (["--controller", "informed pulse"], "'informed pulse' cannot have written a log"),
-        (["--effect", "gremlins"], "unknown effect; known are"),
-        (["--effect", "command_delay", "--from-drive", 3], "--from-drive 3 comes after the last of 2"),
-        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
-    ],
-)
-def test_what_cannot_be_logged_is_one_sentence(words, message, tmp_path, capsys):
-    assert log("--out", tmp_path / "log", *words) == 2
-    assert message in capsys.readouterr().err.splitlines()[-1]
-    assert list(tmp_path.iterdir()) == []

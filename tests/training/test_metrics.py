@@ -40,19 +40,19 @@ def test_figures_of_a_known_episode():
     assert m.stayed[0]
 
 
-def test_what_happens_before_settling_does_not_count():
-    assert run([-3.0, 0.1], settling_time=PERIOD).stayed[0]
-    assert not run([0.1, -3.0], settling_time=PERIOD).stayed[0]
-
-
-def test_overshoot_is_an_excursion_but_no_breakdown():
-    m = run([0.6])
-    assert not m.stayed[0]
-    assert m.breakdown_bar[0] == 0.0
-
-
-def test_a_failed_episode_has_not_stayed():
-    assert not run([0.0, 0.0], failed=1).stayed[0]
+@pytest.mark.parametrize(
+    ("deviations", "options", "stayed"),
+    [
+        ([-3.0, 0.1], {"settling_time": PERIOD}, True),
+        ([0.1, -3.0], {"settling_time": PERIOD}, False),
+        ([0.6], {}, False),
+        ([0.0, 0.0], {"failed": 1}, False),
+    ],
+)
+def test_who_leaves_after_settling_or_fails_has_not_stayed(deviations, options, stayed):
+    found = run(deviations, **options)
+    assert found.stayed[0] == stayed
+    assert (found.breakdown_bar[0] > 0) == (not stayed and deviations[-1] < 0)  # an overshoot is none
 
 
 def test_an_episode_ends_with_the_period_of_its_failure():

@@ -22,7 +22,6 @@ from training.evaluation.scenarios import (
     TUNING_REGION,
     VENTED_DROP_BAR,
     effect_levels,
-    scenario_group,
     worn_scenarios,
 )
 
@@ -45,14 +44,9 @@ def flow(name, seed=0):
     return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
 
 
-def test_a_scenario_has_the_same_text_in_every_process():
-    """It belongs to the subject of a journal: with an address, a comparison would begin anew."""
-    for scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.values():
-        assert " at 0x" not in repr(scenario)
-
-
 def test_the_environment_accepts_every_scenario():
     for name, scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.items():
+        assert " at 0x" not in repr(scenario)  # the subject of a journal: an address would begin it anew
         options = {"control_period": REFERENCE_PERIOD, "parameters": TUNING_REGION, **scenario.options}
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name
 
@@ -116,10 +110,3 @@ def test_every_effect_is_there_at_growing_sizes():
         for symbol in set(levels["top"]) - {"A_pipe"}:
             sizes = [abs(levels[level][symbol]) for level in LEVELS]
             assert 0 < sizes[0] < sizes[1] < sizes[2]
-
-
-def test_groups_and_single_scenarios_are_found_by_name():
-    assert scenario_group("beyond") == BEYOND
-    assert scenario_group("restart") == {"restart": BEYOND["restart"]}
-    with pytest.raises(ValueError, match="no scenario 'flood': give named, beyond, worn, or some of"):
-        scenario_group("flood")

@@ -32,10 +32,5 @@ def test_pairing_takes_away_what_both_met():
     assert found.high - found.low < 0.1
 
 
-def test_a_difference_of_nothing_is_exactly_zero():
-    scores = np.random.default_rng(0).standard_normal(8)
-    assert paired_difference(scores, scores) == (0.0, 0.0, 0.0)
-
-
 def test_the_first_episodes_pair_where_one_has_fewer():
     assert paired_difference(np.zeros(10), np.ones(3)).value == -1.0

@@ -5,7 +5,7 @@ import pytest
 from controllers.registration import Choice, Range
 from controllers.tuned import Tuning, load_tunings, save_tunings
 from epv_env.common.commands import main_of
-from training.commands.tune import _search, kept, widened
+from training.commands.tune import _search, widened
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
@@ -35,10 +35,6 @@ def test_another_budget_is_refused_and_the_file_left_alone(tmp_path, capsys):
     assert main("--only", "hysteresis", "--out", str(path)) == 2
     assert "search all kinds anew" in capsys.readouterr().err
     assert load_tunings(path) == {"hysteresis": OTHER}
-
-
-def test_nothing_is_kept_of_a_file_that_is_not_there(tmp_path):
-    assert kept(tmp_path / "none.json", SEARCH) == {}
 
 
 def test_a_wider_search_is_no_worse_than_the_one_before():

@@ -30,21 +30,14 @@ def deviation(channel):
 
 
 @pytest.mark.parametrize("channel", CHANNELS)
-def test_offset_and_trend_of_table_2_are_in_the_rest_record(channel):
-    offset, slope, _, samples = line(channel)
-    error = deviation(channel) / np.sqrt(samples)
-    assert offset == pytest.approx(SENSORS[channel].offset, abs=4 * 2 * error)
-    assert slope == pytest.approx(SENSORS[channel].trend, abs=4 * np.sqrt(12) * error / 5.0)
-
-
-@pytest.mark.parametrize("channel", CHANNELS)
-def test_the_noise_is_table_3_s(channel):
-    assert line(channel)[2] == pytest.approx(deviation(channel), rel=0.03)
-
-
-@pytest.mark.parametrize("channel", CHANNELS)
-def test_readings_are_whole_steps_of_twelve_bits(channel):
+def test_the_rest_record_shows_tables_1_to_3(channel):
+    """Offset and trend, noise, and readings in whole steps of twelve bits."""
     sensor, unit = SENSORS[channel], UNITS[channel][1]
+    offset, slope, noise, samples = line(channel)
+    error = deviation(channel) / np.sqrt(samples)
+    assert offset == pytest.approx(sensor.offset, abs=4 * 2 * error)
+    assert slope == pytest.approx(sensor.trend, abs=4 * np.sqrt(12) * error / 5.0)
+    assert noise == pytest.approx(deviation(channel), rel=0.03)
     steps = (rest().channel(channel) / unit - sensor.low) / sensor.resolution
     np.testing.assert_allclose(steps, np.rint(steps), atol=1e-6)
     assert np.ptp(steps) >= 3

@@ -72,13 +72,6 @@ def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
     )
 
 
-def test_ends_agree_relative_to_the_best_and_at_zero():
-    fit = calibration().best("least squares")
-    ends = ([1.0, 0.0], [1.0009, 1e-7], [1.002, 0.0], [1.0, 0.01])
-    fits = [replace(fit, z=np.array(z), error=1.0 + i) for i, z in enumerate(ends)]
-    assert reached_best(fits).tolist() == [True, True, False, False]
-
-
 def test_finished_searches_are_not_done_again(tmp_path, calls):
     first = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
     assert len(calls) == len(set(calls)) == 6

@@ -70,10 +70,3 @@ def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
     sentences = warnings(calibration_problem(twin(), free=freed("alphaMV")))
     assert any("misses the recordings by" in warning for warning in sentences)
     assert not any("cannot separate" in warning for warning in sentences)
-
-
-def test_coarse_steps_are_said():
-    """Their sentence comes first; the rest of the campaign is as good as before."""
-    coarse = replace(problem(), steps={"p1": 5e3})
-    (warning,) = calibration_warnings(coarse, calibration().fits)
-    assert "p1 50 mbar" in warning

@@ -67,13 +67,6 @@ def test_the_sandwich_knows_what_neighbours_have_in_common(covariance_of, phi):
     np.testing.assert_allclose(independent, (1 - phi) / (1 + phi), rtol=0.1)
 
 
-def test_on_the_bench_both_agree():
-    """Its noise is white."""
-    parts = twin_confidence().covariance
-    sandwich = np.diag(parts.residual)
-    np.testing.assert_allclose(np.diag(parts.independent), sandwich, rtol=0.3)
-
-
 def test_the_noise_of_the_inputs_adds_with_its_square(monkeypatch):
     """U's and p1's, without the record at rest; none, none."""
     monkeypatch.setattr(stage, "INPUT_DRAWS", 2)

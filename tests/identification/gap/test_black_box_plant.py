@@ -14,10 +14,14 @@ from numpy.typing import NDArray
 from docs.examples.tank import START, Tank, levels, readings, virtual_recordings
 from identification.gap.black_box_plant import BlackBoxPlant, FmuSimulator
 from identification.gap.diagnosis import diagnose
+from identification.gap.fit.gaps import WHOLE
 from identification.gap.plant import NuisanceParameter, PlantError, Run
 from identification.gap.plant_checks import check
+from identification.gap.prepare import sensor_faults
+from identification.gap.prepare.sensor_faults import reading_faults
 from identification.gap.report.gap_json import as_json
 from identification.gap.report.page import sections
+from identification.report.page import Table
 from tests.identification.gap.tank_fmu import build_tank_fmu, can_build
 
 TANK = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
@@ -88,7 +92,7 @@ def test_outputs_of_another_shape_are_named():
         check(plant)
 
 
-def test_a_plant_without_equations_is_diagnosed_and_reported():
+def test_a_plant_without_equations_is_diagnosed():
     """The leaking tank, without its equation, with unknown noise and a catalogue of two."""
     channel = replace(TANK.channels[0], noise=None)
     diagnosed = diagnose(black_box(channels=(channel,), causes=TANK.causes[:2]))
@@ -96,8 +100,27 @@ def test_a_plant_without_equations_is_diagnosed_and_reported():
     best = diagnosed.conclusion.ambiguity_set[0].hypothesis
     assert best.labels == ("leak",)
     assert diagnosed.ranking.problem.values(best.estimate)["leak"] == pytest.approx(4e-3, rel=0.15)
-    assert "f1" not in as_json(diagnosed)["where"]["equation"]
-    assert sections(diagnosed)
+
+
+def test_sensors_and_clock_are_the_places_of_the_gap_and_the_whole_recording_its_regime():
+    """No equations, states or regimes are known; the sensor lags."""
+    found = diagnose(black_box(runs=Tank(virtual_recordings({"c": 0.021, "lag": 5.0})).runs))
+    where = found.localisation
+    assert where.likeliest.equation.name == "reading h"
+    assert where.missing_term is None
+    assert sum(where.equation_probabilities.values()) + where.nothing_missing == pytest.approx(1)
+    (gap,) = where.regime_gaps
+    assert (gap.channel, gap.regime) == ("h", WHOLE)
+    assert gap.gap > 2
+    tables = [b for s in sections(found) for b in s.blocks if isinstance(b, Table)]
+    assert WHOLE.replace("_", " ") in [row[0] for each in tables for row in each.rows]
+    assert list(as_json(found)["where"]["equation"]) == ["reading h", "timing"]
+
+
+def test_recordings_shorter_than_the_longest_delay_are_examined(monkeypatch):
+    monkeypatch.setattr(sensor_faults, "DELAYS", (1, 300))
+    for fault in reading_faults(black_box(), {"c": np.array([0.02])}, [0]):
+        assert np.all(np.isfinite(fault.changes[0]))
 
 
 def test_an_fmu_without_fmpy_says_what_to_install(monkeypatch, tmp_path):

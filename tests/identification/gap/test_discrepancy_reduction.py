@@ -101,11 +101,3 @@ def test_only_a_channel_that_keeps_its_sign_has_a_percentage(offset, amplitude, 
     tank.runs[2].measured[:] = offset + amplitude * np.sin(2 * np.pi * np.arange(240) / 239)
     found = percentage_errors(tank, [run.measured for run in tank.runs])
     assert (found is not None) == has_percent
-
-
-def test_without_a_held_out_run_there_is_nothing_to_judge_on():
-    tank = Tank(virtual_recordings({}))
-    problem, found = estimates(tank, ())
-    tank.runs = tank.runs[:2]
-    with pytest.raises(ValueError, match="no run is held out"):
-        measure_discrepancy_reduction(problem, found)

@@ -25,21 +25,21 @@ PERIODS = 960
 @cache
 def located() -> Localisation:
     """Where the gap lies of an oscillator with a quadratic drag."""
-    problem, estimate = recalibrate(swung({"quadratic": 0.05}, PERIODS, samples=10))
+    problem, estimate = recalibrate(swung(PERIODS, 10, quadratic=0.05))
     residuals = evaluate(problem, [estimate])[0].residuals
     return locate(problem, estimate, residuals, seed=4)
 
 
 def test_a_missing_drag_is_found_in_the_equation_of_the_speed():
     found = located()
-    assert found.equation_probabilities["f2"] > 0.99
+    assert found.equation_probabilities["dv/dt"] > 0.99
     assert found.forcings[0].explained > 0.9
 
 
 def test_quadratic_drag_has_the_shape_of_a_parabola():
     term = located().missing_term
     assert term is not None
-    assert (term.equation.name, term.state) == ("f2", "v")
+    assert (term.equation.name, term.state) == ("dv/dt", "v")
     error = (term.y + 0.05 * term.x * np.abs(term.x)) / term.sd
     assert np.sqrt(np.mean(error**2)) < 2
     assert term.explained > 0.9

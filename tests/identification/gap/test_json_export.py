@@ -60,16 +60,6 @@ def test_a_known_cause_is_the_whole_ambiguity_set_and_its_size_is_that_of_the_ta
     assert content["causes"][0]["shrink"]["fraction"] > 0.9
 
 
-def test_an_interval_stays_within_the_physical_range():
-    found = diagnosed("known")
-    cause = found.conclusion.causes[0]
-    covariance = np.eye(len(cause.hypothesis.estimate.vector))
-    wide = replace(cause, hypothesis=replace(cause.hypothesis, covariance=covariance))
-    parameter = cause.hypothesis.estimate.hypothesis.parameters[0]
-    ((_, low, high),) = magnitudes(found, wide).values()
-    assert (low, high) == (parameter.low, parameter.high)
-
-
 @pytest.mark.parametrize(
     ("unit", "name"),
     [
@@ -79,3 +69,13 @@ def test_an_interval_stays_within_the_physical_range():
 )  # fmt: skip
 def test_a_unit_as_part_of_a_name(unit, name):
     assert unit_name(unit) == name
+
+
+def test_an_interval_stays_within_the_physical_range():
+    found = diagnosed("known")
+    cause = found.conclusion.causes[0]
+    covariance = np.eye(len(cause.hypothesis.estimate.vector))
+    wide = replace(cause, hypothesis=replace(cause.hypothesis, covariance=covariance))
+    parameter = cause.hypothesis.estimate.hypothesis.parameters[0]
+    ((_, low, high),) = magnitudes(found, wide).values()
+    assert (low, high) == (parameter.low, parameter.high)

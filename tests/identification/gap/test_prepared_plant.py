@@ -101,11 +101,6 @@ def test_untrusted_readings_that_are_no_number_count_nothing():
         assert np.all(np.abs(residual) < 200)
 
 
-def test_residuals_are_not_weighed_by_a_noise_that_nobody_knows():
-    with pytest.raises(ValueError, match=r"channel h: its noise is None.*call prepared\(plant\)"):
-        FittingProblem(tank())
-
-
 @pytest.mark.parametrize(
     ("given", "scale"),
     [

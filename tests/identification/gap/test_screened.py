@@ -127,7 +127,7 @@ CLEAN = {
     "encoder": lambda: [np.round(np.sin(np.arange(900) / 200.0) / 0.05) * 0.05] * 2,
     "held": lambda: [np.repeat(own, 10) for own in tank()],
     "drive": lambda: [run.measured[0] for run in Drive({"dead_zone": 0.3, "limit": 0.7}).runs],
-    "oscillator": lambda: [run.measured[0] for run in swung({"coulomb": 0.2}, 120, 6).runs],
+    "oscillator": lambda: [run.measured[0] for run in swung(120, 6, coulomb=0.2).runs],
 }
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from identification.quality.assessment import assess_recording
-from identification.quality.section import as_json, quality_section, signals
+from identification.quality.section import as_json, quality_section
 from identification.recordings.recording import CHANNELS
 from identification.report.page import Picture, Table
 from tests.identification.quality.records import AMBIENT, rest_record, with_channel
@@ -21,28 +21,12 @@ def qualities():
 
 
 @pytest.mark.parametrize("which", [0, 1])
-def test_a_section_is_complete(which):
+def test_section_and_json_are_complete(which):
     section = quality_section(qualities()[which])
     assert [verdict.status for verdict in section.verdicts].count("good") == 5 - which
     assert sum(isinstance(block, Picture) for block in section.blocks) == 1
     for table in (block for block in section.blocks if isinstance(block, Table)):
         assert {len(row) for row in table.rows} == {len(table.columns)}
-
-
-def test_every_axis_of_the_readings_has_a_unit():
-    figure = signals(qualities()[0])
-    assert [axes.get_ylabel() for axes in figure.axes] == [
-        "I [A]",
-        "U [V]",
-        "p1 [bar]",
-        "p2 [bar]",
-        "p3 [bar]",
-    ]
-    assert figure.axes[-1].get_xlabel() == "time [s]"
-
-
-@pytest.mark.parametrize("which", [0, 1])
-def test_json_is_strict_and_complete(which):
     content = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
     assert content["at_rest"] is True
     assert list(content["channels"]) == list(CHANNELS)

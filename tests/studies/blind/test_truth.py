@@ -81,14 +81,6 @@ def test_some_trials_have_the_other_form_and_their_label_says_so(effect):
     assert label["other_forms"] == [effect]
 
 
-def test_a_parameter_that_is_off_is_off_by_more_than_scatter():
-    for number in range(20):
-        trial = draw_trial(0, number, ONE_CAUSE, ["parameter:d1"])
-        off = trial.parameters["d1"] / Parameters.calibrated()["d1"] - 1
-        assert 2 * UNIT_SCATTER_LIMIT * UNIT_SCATTER < abs(off) <= 0.05
-        assert trial.form_deviation == 0
-
-
 def test_units_scatter_within_what_is_said():
     centre = Parameters.calibrated()
     units = [draw_unit(np.random.default_rng(seed)) for seed in range(200)]
