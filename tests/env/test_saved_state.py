@@ -95,11 +95,9 @@ def test_what_cannot_be_restored_is_refused():
         with pytest.raises(StateError, match=words):
             restore_state(each, saved)
     content = saved.to_bytes()
-    wrong_files = (b"", b"no archive", content[:100], b"\xff" * 60 + content[60:], pickle.dumps(saved))
-    for damaged in (
-        *wrong_files,
-        msgspec.msgpack.encode({**msgspec.structs.asdict(saved), "version": 2}),
-    ):
+    later = msgspec.msgpack.encode({**msgspec.structs.asdict(saved), "version": 2})
+    changed_head = b"\xff" * 60 + content[60:]
+    for damaged in (b"", b"no archive", content[:100], changed_head, pickle.dumps(saved), later):
         with pytest.raises(StateError, match="no saved state"):
             SavedState.from_bytes(damaged)
 

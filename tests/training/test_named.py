@@ -63,10 +63,7 @@ def test_a_changed_module_is_another_controller(folder):
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        (
-            "nobody",
-            "no controller 'nobody': give PPO, hysteresis, extrapolating hysteresis, PWM, adaptive",
-        ),
+        ("nobody", "no controller 'nobody': give PPO, hysteresis, extrapolating hysteresis, PWM, adap"),
         ("nowhere:Relay", "No module named 'nowhere': give MODULE:CLASS of a module in"),
         ("faulty:Relay", "module faulty has no class Relay"),
         ("faulty:SOMETHING", "module faulty has no class SOMETHING"),

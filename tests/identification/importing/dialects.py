@@ -44,6 +44,7 @@ def text(
     path: Path, columns: Columns, *, separator: str = ",", decimal: str = ".", head: str = "",
     unit_row: bool = False, bracket: bool = True, encoding: str = "utf-8",
 ) -> Path:  # fmt: skip
+    path = path if path.suffix else path.with_suffix(".csv")
     names = [f"{n} [{u}]" if bracket else n for n, (_, u) in columns.items()]
     lines = [separator.join(names)]
     if unit_row:
@@ -139,22 +140,16 @@ DIALECTS: dict[str, Callable[[Path, Recording], Path]] = {
     "MATLAB 7.3": lambda at, r: mat73(at, named(columns_of(r))),
     "TDMS": lambda at, r: tdms(at, columns_of(r), bench={}),
     "Parquet": lambda at, r: parquet(at.with_suffix(".parquet"), scaled(r, "kPa")),
-    "decimal comma": lambda at, r: text(
-        at.with_suffix(".csv"), scaled(r, "mbar", gauge=True), separator=";", decimal=","
-    ),
+    "decimal comma": lambda at, r: text(at, scaled(r, "mbar", gauge=True), separator=";", decimal=","),
     "unit row and mark": lambda at, r: text(
-        at.with_suffix(".csv"), columns_of(r), unit_row=True, bracket=False, encoding="utf-8-sig"
+        at, columns_of(r), unit_row=True, bracket=False, encoding="utf-8-sig"
     ),
     "comments and tabs": lambda at, r: text(
         at.with_suffix(".txt"), columns_of(r), separator="\t", head="# Prüfstand 3\n# °C\n\n",
         encoding="cp1252",
     ),
-    "UTF-16": lambda at, r: text(
-        at.with_suffix(".csv"), scaled(r, "Pa"), separator=";", encoding="utf-16"
-    ),
-    "psi": lambda at, r: text(at.with_suffix(".csv"), scaled(r, "psi", gauge=True)),
-    "MPa, preamble": lambda at, r: text(
-        at.with_suffix(".csv"), scaled(r, "MPa"), separator=";", head="Bench;7\nOperator;N. N.\n"
-    ),
+    "UTF-16": lambda at, r: text(at, scaled(r, "Pa"), separator=";", encoding="utf-16"),
+    "psi": lambda at, r: text(at, scaled(r, "psi", gauge=True)),
+    "MPa, preamble": lambda at, r: text(at, scaled(r, "MPa"), separator=";", head="Bench;7\nBy;N. N.\n"),
 }  # fmt: skip
 """Twelve dialects: writers of one recording, by name."""
