@@ -178,14 +178,3 @@ def test_a_full_disk_is_named_and_leaves_no_part(tmp_path):
         write_bytes(path, bytes(10_000))
     assert path.read_bytes() == b"before"
     assert [each.name for each in tmp_path.iterdir()] == ["result"]
-
-
-@pytest.mark.parametrize("line", [b"[]", b"{", b'{"name": 3, "result": 1}', b'{"name": "a"}', b"\xff"])
-def test_a_damaged_journal_names_file_line_and_remedy(tmp_path, line):
-    path = tmp_path / "finished.jsonl"
-    Journal(path, {"seed": 0}).add("one", 1)
-    path.write_bytes(path.read_bytes() + line + b"\n" + json.dumps({"name": "b"}).encode() + b"\n")
-    before = path.read_bytes()
-    with pytest.raises(ValueError, match=r"finished\.jsonl, line 3 is damaged: remove this line"):
-        Journal(path, {"seed": 0})
-    assert path.read_bytes() == before

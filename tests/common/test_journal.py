@@ -59,8 +59,10 @@ def test_a_later_result_replaces_an_earlier_one(path):
 )
 def test_a_changed_line_is_refused_with_its_number(path, change):
     path.write_text(path.read_text().replace(*change))
-    with pytest.raises(ValueError, match="line 2 is damaged: remove this line"):
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=r"journal\.jsonl, line 2 is damaged: remove this line"):
         Journal(path, SUBJECT)
+    assert path.read_bytes() == before
 
 
 @pytest.mark.parametrize("shape", [lambda found: found["x"], len, lambda found: found.keys(), int])

@@ -28,7 +28,7 @@ from epv_env.common.files import JSONFileError
 from epv_env.plant.plantfile import Plant
 from identification.recordings.log_files import Log, read_log
 from tests.training.exports import sanitisers
-from training.commands.monitor import agreement, follow, sentences
+from training.commands.monitor import follow, sentences
 from training.deploy.compiled import build
 from training.deploy.monitor_c import effects_of, sources
 from training.drives import drives, write_log
@@ -201,21 +201,6 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     assert np.isfinite(monitor.log_odds)
     log = Log(name="", temperature=293.0, pressure=1e5, period=5e-3, drives=())
     assert "Restarts because its state was not finite: 1." in sentences(monitor, log, [])
-
-
-def test_a_diagnosis_that_differs_is_explained() -> None:
-    content = {"verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None}
-    monitor = Monitor(white_model())
-    assert "agrees: no_gap" in agreement(monitor, content)
-    monitor._log[1] = 50.0
-    assert "second (no_gap): the valve differs from the start on" in agreement(monitor, content)
-    monitor._since[1] = 60.0
-    assert "second (no_gap): this effect is absorbed" in agreement(monitor, content)
-    content["ambiguity_set"] = [["second"], ["third"]]
-    assert "agrees" in agreement(monitor, content)
-    content["ambiguity_set"] = [["third"]]
-    assert "names third: it simulates every effect" in agreement(monitor, content)
-    assert "hardly shows" in agreement(Monitor(white_model()), content)
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:

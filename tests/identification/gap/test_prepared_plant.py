@@ -47,12 +47,6 @@ def noisy(samples: int, period: float, seed: int = 0) -> NDArray:
     return np.sin(2 * np.pi * np.arange(samples) / period) + SIGMA * noise
 
 
-@pytest.mark.parametrize(("samples", "period", "accuracy"), [(80, 30.0, 0.25), (55_000, 900.0, 0.03)])
-def test_noise_is_seen_beside_motion(samples, period, accuracy):
-    plant = recorded(*(noisy(samples, period, seed) for seed in range(3)))
-    assert plant.channels[0].noise == pytest.approx(SIGMA, rel=accuracy)
-
-
 def test_neighbours_of_a_slow_channel_are_its_trusted_readings():
     readings, trusted = np.full(10_000, np.nan), np.zeros(10_000, bool)
     trusted[::10] = True
