@@ -115,15 +115,6 @@ def test_what_is_under_way_is_the_gain_without_a_stay_to_the_bit(table, cases):
     assert np.array_equal(at_once, each("gained", table, p1, p2, p3, np.zeros(len(p1)), 0.0))
 
 
-def test_nothing_is_to_be_added_where_enough_is_under_way(table):
-    wide_open = (np.array([11.5]), np.array([8.0]), np.array([5.0]))
-    under_way = each("gained", table, *wide_open, np.zeros(1), 0.0)
-    assert under_way[0] > 0.3
-    assert each("duration", table, *wide_open, 0.9 * under_way, 0.0)[0] == 0.0
-    assert each("duration", table, *wide_open, 1.1 * under_way, 0.0)[0] > 0.0
-    assert each("duration", table, *wide_open, np.array([99.0]), 0.0)[0] <= STAY[-1]
-
-
 def test_p3_vents_at_one_rate_until_the_valve_opens(plant, table):
     """The axis of the table: ln p3 falls linearly, so the opening pressure is met when foretold."""
     p1, p2 = np.array([11.0]), np.array([7.0])

@@ -12,7 +12,6 @@ from controllers.valve_learner import (
     GAIN_SPREAD,
     MOST_RESERVE,
     OFFSET_SPREAD,
-    OFFSETS,
     TOLERATED,
     VALVE,
 )
@@ -82,14 +81,6 @@ def test_a_rise_before_the_expected_opening_tells_of_a_higher_opening_pressure(t
         valve_learner.summarise(valve)
     assert first["offset"] > 0.5
     assert second["offset"] == pytest.approx(0.0, abs=1e-12)
-
-
-def test_probabilities_stay_a_distribution_and_spread_to_the_neighbours():
-    (record,) = unknown()
-    record["probability"] = np.eye(len(OFFSETS))[10]
-    valve_learner.smear(record)
-    assert record["probability"].sum() == pytest.approx(1.0)
-    assert np.flatnonzero(record["probability"]).tolist() == [9, 10, 11]
 
 
 def controlled(parameters, *, episodes=16, periods=600, **options):

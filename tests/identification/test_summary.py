@@ -12,8 +12,7 @@ from identification.pipeline.summary import common_reasons, judge_values, summar
 from identification.recordings.recording import Campaign
 from identification.report.page import Table
 from identification.validation import Validation, validate
-from tests.identification.confidence.results import twin_confidence
-from tests.identification.twins import TRUE, calibration, problem, twin
+from tests.identification.twins import TRUE, calibration, problem, twin, twin_confidence
 
 
 def identification(

@@ -20,8 +20,6 @@ from identification.report_2003 import CALIBRATION_CASES
 
 pytestmark = pytest.mark.slow
 
-NO_ARMATURE = ("V2", "alphaPV", "a1", "alphaMV", "V3")
-
 
 @cache
 def one_at_a_time() -> OneAtATime:
@@ -76,10 +74,3 @@ def deviation(step: float) -> float:
 def test_it_converges_to_the_exact_integrator():
     assert deviation(1e-5) < 50.0
     assert deviation(1e-5) < 0.1 * deviation(5e-4)
-
-
-@pytest.mark.parametrize("symbol", NO_ARMATURE)
-def test_rows_that_leave_the_armature_alone_carry_no_scatter(symbol):
-    """No pressure acts on the armature, so its scatter is the same in both runs and cancels."""
-    scatter = one_at_a_time().scatter[symbol]
-    assert np.ptp(scatter, axis=0).max() < 0.03 * scatter.mean()

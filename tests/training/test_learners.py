@@ -39,7 +39,7 @@ def env():
     )
 
 
-def test_the_written_network_is_the_actor_that_is_trained(env):
+def test_the_written_network_is_the_actor_that_is_trained_and_begins_with_the_advice(env):
     model = make_model(env, seed=3)
     inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
     with torch.no_grad():
@@ -48,13 +48,9 @@ def test_the_written_network_is_the_actor_that_is_trained(env):
     logits = network_of(model).logits(inputs)
     difference = np.diff(logits, axis=1) - np.diff(expected, axis=1)  # torch normalises its logits
     assert np.max(np.abs(difference)) < 1e-5
-
-
-def test_before_training_the_policy_acts_as_the_advice(env):
-    inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
     inputs[:, -1] = np.sign(inputs[:, -1])
-    logits = network_of(make_model(env, seed=3)).logits(inputs)
-    assert np.array_equal(np.argmax(logits, axis=1), (inputs[:, -1] > 0).astype(int))
+    begins = np.argmax(network_of(model).logits(inputs), axis=1)
+    assert np.array_equal(begins, (inputs[:, -1] > 0).astype(int))
 
 
 def test_training_is_stricter_than_the_reward_and_follows_its_prices():

@@ -1,8 +1,11 @@
-"""The control aims' figures, against episodes whose figures are known."""
+"""The control aims' figures of known episodes, their intervals and differences; seeds by purpose."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from training.evaluation import seeds
 from training.evaluation.metrics import (
     EpisodeMetrics,
     Meter,
@@ -10,6 +13,7 @@ from training.evaluation.metrics import (
     tail_excursion,
     violation_interval,
 )
+from training.evaluation.statistics import mean_interval, paired_difference
 
 PERIOD = 0.1
 
@@ -110,3 +114,47 @@ def test_episodes_join_and_their_events_weigh_equally():
     assert len(both) == 2
     assert summary(both)["C2_event_breakdown_bar"] == pytest.approx((0.3 + 3 * 0.1) / 4)
     assert len(both.first(1)) == 1
+
+
+def test_95_percent_intervals_of_a_normal_mean_hold_it_about_as_often():
+    rng = np.random.default_rng(1)
+    ends = [mean_interval(rng.standard_normal(60)) for _ in range(150)]
+    held = np.mean([low <= 0.0 <= high for low, high in ends])
+    assert 0.90 <= held <= 0.985
+
+
+def test_the_interval_has_the_width_of_the_normal_theory():
+    low, high = mean_interval(np.random.default_rng(0).standard_normal(1200))
+    assert high - low == pytest.approx(2 * 1.96 / np.sqrt(1200), rel=0.1)
+
+
+def test_pairing_takes_away_what_both_met():
+    rng = np.random.default_rng(0)
+    met = 10 * rng.standard_normal(200)
+    ours, theirs = met + 0.1 * rng.standard_normal(200), met + 1.0
+    found = paired_difference(ours, theirs)
+    assert found.value == pytest.approx(-1.0, abs=0.05)
+    assert found.low < found.value < found.high
+    assert found.high - found.low < 0.1
+
+
+def test_the_first_episodes_pair_where_one_has_fewer():
+    assert paired_difference(np.zeros(10), np.ones(3)).value == -1.0
+
+
+def test_the_ranges_do_not_meet():
+    firsts = sorted(seed for name, seed in vars(seeds).items() if name.endswith("_SEED"))
+    assert min(b - a for a, b in pairwise(firsts)) >= seeds.RANGE
+
+
+def test_a_training_stays_in_its_range_and_each_has_its_own_episodes():
+    firsts = {seeds.first_training_seed(seed, steps, 1024) for seed in range(40) for steps in (0, 10**6)}
+    assert len(firsts) == 80
+    assert min(firsts) >= seeds.TRAINING_SEED
+    assert max(firsts) + 1024 <= seeds.TRAINING_SEED + seeds.RANGE
+
+
+def test_episodes_beyond_their_range_are_refused():
+    seeds.check_first_seed(995_904, 4096)
+    with pytest.raises(ValueError, match="with 4096 episodes give one up to 995904"):
+        seeds.check_first_seed(995_905, 4096)

@@ -7,12 +7,10 @@ pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.common.units import BAR
-from epv_env.plant.consumption import Profiles, draw_profile
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import REFERENCE_PERIOD
 from epv_env.settings import make_settings
-from epv_env.signals import RecordedConsumption
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
 from training.evaluation.scenarios import (
     BEYOND,
@@ -27,21 +25,9 @@ from training.evaluation.scenarios import (
 
 pytestmark = pytest.mark.training
 
-CONTROLLER = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03)
-TIME = np.arange(0.0, 10.0, 0.005)
-
 
 def settings(name):
     return make_settings(Plant.calibrated(), control_period=0.005, **EVALUATION[name].options)
-
-
-def flow(name, seed=0):
-    """Consumption over 10 s [g/s]."""
-    profiles = Profiles(1)
-    scenario = settings(name).scenario
-    assert not isinstance(scenario, RecordedConsumption)
-    profiles.start(0, draw_profile(scenario, np.random.default_rng(seed)))
-    return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
 
 
 def test_the_environment_accepts_every_scenario():
@@ -51,18 +37,15 @@ def test_the_environment_accepts_every_scenario():
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name
 
 
-class Shut(Hysteresis):
-    """Keeps the coil on, which shuts the valve."""
+class Always(Hysteresis):
+    """Keeps the coil on, which shuts the valve, or off, which opens it."""
+
+    def __init__(self, on: bool):
+        super().__init__(open_below=-0.1, shut_above=0.0)
+        self.on = on
 
     def act(self, observations):
-        return np.ones(len(observations), dtype=int)
-
-
-class Open(Hysteresis):
-    """Keeps the coil off, which opens the valve."""
-
-    def act(self, observations):
-        return np.zeros(len(observations), dtype=int)
+        return np.full(len(observations), int(self.on))
 
 
 def test_an_open_valve_refills_within_the_settling_time():
@@ -70,9 +53,7 @@ def test_an_open_valve_refills_within_the_settling_time():
         "parameters": TUNING_REGION, "drop_bar": (4.4, 4.4), "scenario": "none",
         "settling_time": REFILL_TIME,
     }  # fmt: skip
-    metrics = run_episodes(
-        Open(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=2.0, options=options
-    )
+    metrics = run_episodes(Always(on=False), seeds=list(range(16)), duration=2.0, options=options)
     assert np.all(metrics.breakdown_bar < 0.5)
 
 
@@ -89,8 +70,7 @@ def highest_error(controller, duration, **options):
 @pytest.mark.parametrize(("drop", "avoidable"), [(VENTED_DROP_BAR[0], True), (0.3, False)])
 def test_a_vented_valve_can_be_shut_in_time_only_from_far_below(drop, avoidable):
     options = {"p3_bar": (1.0, 1.0), "drop_bar": (drop, drop), "scenario": "none"}
-    shut = Shut(open_below=-0.1, shut_above=0.0)
-    assert (highest_error(shut, 1.5, **options) < 0.5) == avoidable
+    assert (highest_error(Always(on=True), 1.5, **options) < 0.5) == avoidable
 
 
 def test_a_starved_circuit_reaches_its_band_once_refilled_and_not_before():

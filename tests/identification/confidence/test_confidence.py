@@ -6,8 +6,7 @@ import numpy as np
 
 from identification.confidence.confidence import assess_confidence
 from identification.confidence.section import confidence_section
-from tests.identification.confidence.results import twin_confidence
-from tests.identification.twins import TRUE, calibration, problem
+from tests.identification.twins import TRUE, calibration, problem, twin_confidence
 
 
 def displaced(factors):

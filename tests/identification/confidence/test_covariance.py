@@ -10,8 +10,7 @@ from scipy.stats import chi2
 from identification.calibration.search import weighted_least_squares
 from identification.confidence import covariance as stage
 from identification.confidence.covariance import estimate_covariance
-from tests.identification.confidence.results import twin_confidence
-from tests.identification.twins import TRUE, problem
+from tests.identification.twins import TRUE, problem, twin_confidence
 
 SAMPLES, RECORDINGS = 4000, 3
 SLOPES = (1.0, 0.5, 2.0)

@@ -5,8 +5,7 @@ import pytest
 from scipy.stats import t
 
 from identification.confidence.confidence import limit_ratio
-from tests.identification.confidence.results import twin_confidence
-from tests.identification.twins import problem
+from tests.identification.twins import problem, twin_confidence
 
 
 @pytest.mark.parametrize("degrees", [5, 50, 18000])

@@ -1,7 +1,5 @@
 """Where the gap of an oscillator lies that swings thousands of times in a recording."""
 
-from functools import cache
-
 import numpy as np
 
 from identification.gap.fit.evidence import evaluate
@@ -22,7 +20,6 @@ PERIODS = 960
 """Of the drive in a recording: twelve in each of 80 windows."""
 
 
-@cache
 def located() -> Localisation:
     """Where the gap lies of an oscillator with a quadratic drag."""
     problem, estimate = recalibrate(swung(PERIODS, 10, quadratic=0.05))
@@ -30,14 +27,11 @@ def located() -> Localisation:
     return locate(problem, estimate, residuals, seed=4)
 
 
-def test_a_missing_drag_is_found_in_the_equation_of_the_speed():
+def test_a_missing_drag_is_found_in_the_equation_of_the_speed_as_a_parabola():
     found = located()
     assert found.equation_probabilities["dv/dt"] > 0.99
     assert found.forcings[0].explained > 0.9
-
-
-def test_quadratic_drag_has_the_shape_of_a_parabola():
-    term = located().missing_term
+    term = found.missing_term
     assert term is not None
     assert (term.equation.name, term.state) == ("dv/dt", "v")
     error = (term.y + 0.05 * term.x * np.abs(term.x)) / term.sd

@@ -13,7 +13,7 @@ from identification.gap.diagnosis import Diagnosis, diagnose
 from identification.gap.judge.held_out import NOMINAL
 from identification.gap.report.figures import comparison_figure
 from identification.gap.report.gap_json import as_json
-from identification.gap.report.page import calibrated_values, gap_table, ranking_table, sections
+from identification.gap.report.page import calibrated_values, ranking_table, sections
 from identification.gap.report.quantities import probability_text
 from identification.gap.report.sentences import (
     look_alikes,
@@ -89,14 +89,6 @@ def test_a_doubt_has_a_reason_and_causes_that_hardly_may_act_have_no_line(name):
     assert all(row[0] == "evaporation" for row in rows if row[1] == "< 1 %"), "the nearest, if any"
 
 
-def test_no_gap_in_doubt_names_the_cause_that_may_act():
-    found = diagnosed("no_gap")
-    doubted = replace(found, ranking=replace(found.ranking, no_cause=0.4, unknown=0.45))
-    status, text = verdict_sentence(doubted)
-    assert status == "doubt"
-    assert "something outside the catalogue may act (45 %); that no cause acts has a" in text
-
-
 def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
     status, text = verdict_sentence(diagnosed("known"))
     cause = as_json(diagnosed("known"))["causes"][0]
@@ -105,13 +97,6 @@ def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
     assert text.startswith(f"leak explains the gap ({probability}): adding it with leak = 0.00")
     assert f"closes {100 * cause['shrink']['fraction']:.0f} % (" in text
     assert "nothing predictable is left" in text
-
-
-def test_a_black_box_that_does_not_help_is_said_to():
-    found = diagnosed("known")
-    assert "itself is the floor" not in gap_table(found).caption
-    useless = replace(found, reduction=replace(found.reduction, black_box_helps=False))
-    assert gap_table(useless).caption.endswith("the recalibrated model itself is the floor.")
 
 
 def test_an_unknown_cause_is_sent_to_the_place_and_the_shape():

@@ -6,7 +6,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-import scipy.io
 
 from identification.importing.binary_files import ALL_INVALID
 from identification.importing.import_campaign import read_files, read_source, source_table
@@ -111,14 +110,6 @@ def test_what_holds_no_numbers_does_not_stand_in_the_way(true, tmp_path):
         channels[-1].flags |= ALL_INVALID
         file.save(path.with_stem("run2"), overwrite=True)
     path = path.with_stem("run2")
-    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
-
-
-def test_a_matlab_function_stands_in_the_list_and_not_in_the_way(true, tmp_path, monkeypatch):
-    function = scipy.io.matlab.MatlabFunction(np.empty(0, dtype=object))
-    path = mat5(tmp_path / "run", {})
-    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {**interval(true), "f": function})
-    assert any("f (a MATLAB object" in channel.name for channel in read_source(path).channels)
     assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
 
 

@@ -1,5 +1,6 @@
 """Known columns have known collinearity; parameters that act by their ratio cannot be told apart."""
 
+import json
 from functools import cache
 
 import numpy as np
@@ -10,6 +11,7 @@ from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.model_inputs import ModelInputs
 from identification.replay.replay import Replay
+from identification.report.page import Table, write_page
 from identification.report_2003 import (
     CALIBRATION_CASES,
     CIRCUIT_PRESSURE,
@@ -26,6 +28,8 @@ from identification.sensitivity.collinearity import (
     sensitivities_on_recordings,
 )
 from identification.sensitivity.one_at_a_time import studied_symbols
+from identification.sensitivity.section import sensitivity_json, sensitivity_section
+from tests.identification.sensitivity.test_one_at_a_time import exact
 
 
 def sensitivities_in_cases() -> OutputSensitivities:
@@ -78,3 +82,21 @@ def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
     monkeypatch.setattr(collinearity, "DIFFERENCE_STEP", 1e-3)
     finer = sensitivities_in_cases()
     assert finer.effect == pytest.approx(usual, rel=0.01)
+
+
+def test_section_and_data(tmp_path):
+    section = sensitivity_section(exact(), nominal_sensitivities())
+    assert [verdict.status for verdict in section.verdicts] == ["good", "note"]
+    errors, pairs = section.blocks
+    assert isinstance(errors, Table)
+    assert isinstance(pairs, Table)
+    assert len(errors.rows) == len(exact())
+    assert ["V2, alphaPV", "infinite"] in [sorted_pair(row) for row in pairs.rows]
+    write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
+    data = json.loads(json.dumps(sensitivity_json(exact(), nominal_sensitivities()), allow_nan=False))
+    assert data["collinearity"]["all_sensitive"] is None
+    assert data["exact"]["R"]["sensitive"]
+
+
+def sorted_pair(row):
+    return [", ".join(sorted(row[0].split(", "))), row[1]]

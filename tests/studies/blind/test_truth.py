@@ -19,7 +19,6 @@ from docs.studies.blind.truth import (
     draw_unit,
     trial_plan,
 )
-from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.valve_gap.causes import PARAMETER_COMPONENTS
@@ -53,16 +52,6 @@ def test_every_effect_comes_up_alone_and_thrice_as_often_as_a_parameter():
     parameters = [f"parameter:{symbol}" for symbol in PARAMETER_COMPONENTS]
     expected = dict.fromkeys(EFFECTS, 3) | dict.fromkeys(parameters, 1)
     assert first_causes(ONE_CAUSE, deck) == expected
-
-
-def test_sizes_are_those_of_the_effect_and_in_its_domain():
-    for effect in EFFECTS:
-        for number in range(5):
-            trial = draw_trial(0, number, ONE_CAUSE, [effect])
-            assert set(trial.sizes) <= set(CATALOGUE[effect])
-            # Out of the domain, this raises.
-            assert {s: trial.parameters[s] for s in trial.sizes} == trial.sizes
-            assert trial.form_deviation > 0
 
 
 def drawn(effect, forms="usual", trials=200):
