@@ -7,7 +7,6 @@ import pytest
 
 pytest.importorskip("control")
 
-import pytest
 
 from controllers.hysteresis import Hysteresis
 from controllers.pwm_design import design, linearise, outer_loop

@@ -93,17 +93,6 @@ def test_reset_clears_the_strip_chart() -> None:
     assert counts[2] > counts[1] > 0
 
 
-def test_phases_are_told_apart() -> None:
-    names = {
-        window.phase(replace(SHUT, coil_on=coil_on, xPV_fraction=xPV, xMV_fraction=xMV))[0]
-        for coil_on, xPV, xMV in (
-            (True, 0.0, 1.0), (True, 0.5, 1.0), (True, 0.5, 0.0),
-            (False, 0.0, 0.0), (False, 0.5, 0.0), (False, 0.0, 1.0),
-        )
-    }  # fmt: skip
-    assert names == {"Holding", "Closing", "Pulling in", "Venting", "Filling", "Releasing"}
-
-
 def test_human_mode_shows_a_window() -> None:
     pygame = pytest.importorskip("pygame")
     renderer = Renderer("human", fps=1000)

@@ -1,17 +1,19 @@
-"""The batched integrator against SciPy with every event at a border of its own."""
+"""The batched integrator against SciPy with every event at a border of its own, and runs of others."""
 
 from functools import cache
 from itertools import pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
+from epv_env.common.units import BAR, MILLIMETRE
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import Inputs
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.simulate import energised
+from epv_env.plant.simulate import energised, simulate
 from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES, POSITIONS
 from tests.reference.reference_simulation import ReferenceRun, simulate_reference
 from tests.reference.schedule import (
@@ -188,3 +190,24 @@ def test_this_comparison_can_fail(change):
         other = report_tests(p.replace(alphaMV=1.01 * p["alphaMV"]))["test1"]
         found = plant_states(other, run.time)
     assert np.max(np.abs(found.p2 - run.state.p2)) > MILLIBAR
+
+
+SHARED = Path(__file__).parents[3] / "shared" / "reference"
+RUNS = ("test1", "test2", "test3", "test4", "validation", "consumption")
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason=f"the reference runs are not at {SHARED}")
+@pytest.mark.parametrize("name", RUNS)
+def test_agrees_with_another_implementation(name):
+    run = np.genfromtxt(SHARED / f"{name}.csv", delimiter=",", names=True)
+    p1, p = run["p1_bar"] * BAR, Parameters.calibrated()
+    start = energised(p, p1=p1[0], p2=run["p2_bar"][0] * BAR, U=run["U_V"][0])
+    found = simulate(
+        p, initial=start, U=run["U_V"], period=run["time_s"][1], sigma_S=run["sigmaS_kg_per_s"], p1=p1
+    ).state
+    moving = (run["xMV_mm"] > 0) & (run["xMV_mm"] < p["xMVmax"] / MILLIMETRE)
+    assert np.max(np.abs(found.p2 / BAR - run["p2_bar"])) < 1e-3
+    assert np.max(np.abs(found.p3 / BAR - run["p3_bar"])) < 1e-3
+    assert np.max(np.abs(found.I - run["I_A"])[~moving]) < 0.5e-3
+    assert np.max(np.abs(found.I - run["I_A"])) < 2e-3
+    assert np.max(np.abs(found.xMV / MILLIMETRE - run["xMV_mm"])) < 5e-3

@@ -11,7 +11,6 @@ import pytest
 
 pytest.importorskip("stable_baselines3")
 import numpy as np
-import pytest
 from PIL import Image
 
 from epv_env.common.commands import main_of

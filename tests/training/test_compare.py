@@ -48,12 +48,6 @@ def results():
     return compare({"good": GOOD, "late": LATE}, plant=PLANT, scenarios=STEPS, episodes=24, duration=3.0)
 
 
-def test_an_episode_depends_on_its_seed_alone():
-    many = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
-    alone = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
-    assert many.episode_return[7] == alone.episode_return[0]
-
-
 def test_a_restart_makes_the_controller_forget_once_at_its_time():
     controller = Recorder()
     run_episodes(controller, seeds=[1, 2], duration=0.1, options={}, restart_s=0.05)

@@ -72,8 +72,8 @@ def _inputs(number: int) -> dict[str, NDArray]:
 
 def _response(values: Mapping[str, float], run: Run) -> NDArray:
     """Outputs (1, samples)."""
-    p = {name: nominal for name, (_, _, nominal, _) in RANGES.items()} | {"gain": 1.0, "zero": 0.0}
-    p, u = p | values, run.inputs["u"]
+    nominal = {name: value for name, (_, _, value, _) in RANGES.items()}
+    p, u = {**nominal, "gain": 1.0, "zero": 0.0, **values}, run.inputs["u"]
     moved = np.clip(np.sign(u) * np.maximum(np.abs(u) - p["dead_zone"], 0.0), -p["limit"], p["limit"])
     kept = np.exp(-PERIOD / max(p["lag"], 1e-9))
     lagged = np.asarray(lfilter([1.0 - kept], [1.0, -kept], moved))

@@ -14,7 +14,7 @@ from identification.gap.locate.forcing import (
 )
 from identification.gap.locate.localisation import Localisation, locate
 from identification.gap.plant import StateTrace
-from tests.identification.gap.oscillators import swung
+from tests.identification.gap.ode_plants import swung
 
 PERIODS = 960
 """Of the drive in a recording: twelve in each of 80 windows."""

@@ -15,7 +15,7 @@ from identification.gap.prepare.screened import Finding, screen
 from identification.gap.report.gap_json import as_json
 from identification.gap.report.sentences import verdict_sentence
 from tests.identification.gap.drives import Drive
-from tests.identification.gap.oscillators import swung
+from tests.identification.gap.ode_plants import swung
 from tests.identification.gap.tanks import diagnosed
 
 LEAKING = {"c": 0.021, "leak": 4e-3}

@@ -1,6 +1,7 @@
-"""One recording written in the dialects of benches; each writer returns the file's path."""
+"""A campaign of the virtual bench, in the dialects of benches, and whether it comes back."""
 
 from collections.abc import Callable, Mapping
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -8,7 +9,12 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from identification.recordings.recording import Recording
+from epv_env.plant.parameters import Parameters
+from identification.bench.programmes import REPORT_SUITE
+from identification.bench.session import run_bench
+from identification.importing.import_campaign import ImportedCampaign, read_files
+from identification.recordings.campaign_files import write_campaign
+from identification.recordings.recording import CHANNELS, Campaign, Recording
 
 Columns = dict[str, tuple[NDArray, str]]
 """Values with their unit, by name."""
@@ -153,3 +159,26 @@ DIALECTS: dict[str, Callable[[Path, Recording], Path]] = {
     "MPa, preamble": lambda at, r: text(at, scaled(r, "MPa"), separator=";", head="Bench;7\nBy;N. N.\n"),
 }  # fmt: skip
 """Twelve dialects: writers of one recording, by name."""
+
+
+@cache
+def bench() -> Campaign:
+    """A test, the validation and the record at rest."""
+    suite = (REPORT_SUITE[0], REPORT_SUITE[-2], REPORT_SUITE[-1])
+    return run_bench(suite, Parameters.calibrated(), seed=11)
+
+
+def assert_same_recordings(made: Campaign, true: Campaign) -> None:
+    """Names, roles and periods are equal; pressures differ by 1 Pa at most, I and U by 1e-5 [A, V]."""
+    for own, original in zip(made.recordings, true.recordings, strict=True):
+        assert (own.name, own.role, own.period) == (original.name, original.role, original.period)
+        for name in CHANNELS:
+            atol = 1.0 if name.startswith("p") else 1e-5
+            np.testing.assert_allclose(own.channel(name), original.channel(name), rtol=0, atol=atol)
+
+
+def import_campaign(files, out, **options: Any) -> ImportedCampaign:
+    """`read_files`, written as a campaign into the folder `out`."""
+    imported = read_files(files, **options)
+    write_campaign(imported.campaign, out, provenance=imported.provenance())
+    return imported

@@ -12,8 +12,14 @@ from identification.importing.source_file import ImportingError
 from identification.importing.units import parsed_unit
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CampaignError
-from tests.identification.importing.dialects import DIALECTS, columns_of, text
-from tests.identification.importing.round_trip import assert_same_recordings, bench, import_campaign
+from tests.identification.importing.dialects import (
+    DIALECTS,
+    assert_same_recordings,
+    bench,
+    columns_of,
+    import_campaign,
+    text,
+)
 from tests.identification.importing.timed_files import SAME_RATE
 
 
@@ -39,22 +45,6 @@ def test_resampling_neither_delays_nor_folds():
     assert np.max(np.abs(made[outside])) < 0.005
     late = np.sin(2 * np.pi * (10 * (grid - 1e-5) + (5000 - 10) * (grid - 1e-5) ** 2 / 4))
     assert np.max(np.abs(late - true)[inside]) > 0.01
-
-
-def test_channels_of_other_rates_and_jitter_come_to_one_grid(tmp_path):
-    """The current at 2 kHz, jittering pressures; no current sample moves, no pressure is delayed."""
-    recording = bench().recordings[0]
-    rng = np.random.default_rng(1)
-    columns = columns_of(recording)
-    jitter = recording.time + rng.uniform(-1e-4, 1e-4, len(recording))
-    columns["time"] = (jitter, "s")
-    path = text(tmp_path / "test1.csv", columns)
-    campaign = import_campaign([path], tmp_path / "out", rate=1000.0, ambient_bar=1.0).campaign
-    made = campaign.recordings[0]
-    assert made.period == 1e-3
-    assert json.loads((tmp_path / "out/campaign.json").read_text())["provenance"]["files"][0][
-        "channels"
-    ]["p1"]["resampled"]
 
 
 def test_a_dry_run_shows_everything_and_writes_nothing(tmp_path, capsys):

@@ -11,7 +11,7 @@ from identification.importing.binary_files import ALL_INVALID
 from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
-from tests.identification.importing.dialects import columns_of, mat5, tdms, text
+from tests.identification.importing.dialects import bench, columns_of, mat5, tdms, text
 from tests.identification.importing.odd_files import (
     NAMES,
     READ,
@@ -23,7 +23,6 @@ from tests.identification.importing.odd_files import (
     nulls,
     texts,
 )
-from tests.identification.importing.round_trip import bench
 
 
 @pytest.fixture(scope="module")

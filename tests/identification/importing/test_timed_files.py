@@ -11,9 +11,8 @@ from identification.importing.source_file import ImportingError
 from identification.importing.times import points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CHANNELS
-from tests.identification.importing.dialects import columns_of, mat5, text
+from tests.identification.importing.dialects import bench, columns_of, import_campaign, mat5, text
 from tests.identification.importing.dialects import tdms as in_groups
-from tests.identification.importing.round_trip import bench, import_campaign
 from tests.identification.importing.timed_files import LEAD, TWO_RATES, channels_of, structs, tdms
 
 

@@ -1,18 +1,23 @@
 """A perfect bench passes every check; each kind of fault fails its own."""
 
+import json
 from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
+from scipy import stats
 
-from docs.studies.reproduction.errata import TREND_OFFSETS
+from docs.studies.reproduction.errata import SAMPLES as REPORTED
+from docs.studies.reproduction.errata import STATISTICS, TREND_OFFSETS, TREND_SLOPES
 from epv_env.plant.channels import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets, white_noise_band
 from identification.quality.channel import descriptive_statistics, run_limit
+from identification.quality.section import as_json, quality_section
 from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from identification.recordings.recording_checks import longest_run
+from identification.report.page import Picture, Table
 from tests.identification.quality.records import AMBIENT, PERIOD, readings, rest_record, with_channel
 
 SAMPLES = 10_000
@@ -120,9 +125,6 @@ def test_too_short_a_record_is_refused():
         assess_recording(rest_record(0, 249), AMBIENT)
 
 
-TIME = np.arange(10_000) / 2000
-
-
 def test_a_sine_has_its_closed_forms():
     statistics = descriptive_statistics(2 * np.sin(2 * np.pi * 10 * TIME), greatest=20.0)
     assert statistics.arithmetic_mean == pytest.approx(0.0, abs=1e-12)
@@ -158,3 +160,52 @@ def test_a_drift_does_not_shorten_the_run_that_is_allowed():
     drifting = np.rint(np.linspace(0, 1000, 10_000))
     limit = run_limit(drifting, rounding=1.0)
     assert limit == pytest.approx(np.log(1e-8) / np.log(0.383), abs=2)
+
+
+@cache
+def qualities():
+    """A perfect record, and one with a channel that never changes."""
+    stuck = with_channel(rest_record(1, 2000), "U", np.zeros(2000))
+    return assess_recording(rest_record(0, 2000), AMBIENT), assess_recording(stuck, AMBIENT)
+
+
+@pytest.mark.parametrize("which", [0, 1])
+def test_section_and_json_are_complete(which):
+    section = quality_section(qualities()[which])
+    assert [verdict.status for verdict in section.verdicts].count("good") == 5 - which
+    assert sum(isinstance(block, Picture) for block in section.blocks) == 1
+    for table in (block for block in section.blocks if isinstance(block, Table)):
+        assert {len(row) for row in table.rows} == {len(table.columns)}
+    content = json.loads(json.dumps(as_json(qualities()[which]), allow_nan=False))
+    assert content["at_rest"] is True
+    assert list(content["channels"]) == list(CHANNELS)
+    assert len(content["correlations"]) == (10, 6)[which]
+    assert content["channels"]["I"]["status"] == "good"
+    assert (content["channels"]["U"]["statistics"]["kurtosis"] is None) == bool(which)
+
+
+def chance_of_staying_below(factor):
+    """That none of n independent normal samples exceeds the factor."""
+    return (1 - 2 * stats.norm.sf(factor)) ** REPORTED
+
+
+def test_trends_are_insignificant_and_offsets_small():
+    for name in CHANNELS:
+        sensor, sigma = SENSORS[name], STATISTICS[name].standard_deviation
+        assert abs(TREND_SLOPES[name]) < 1.8 * sigma * np.sqrt(12 / REPORTED) / 5
+        offset = TREND_OFFSETS[name] - name.startswith("p")
+        assert abs(offset) < 0.029 * sensor.accuracy * sensor.high
+
+
+def test_outlier_factors_are_what_chance_makes_them_or_less():
+    p3, step = STATISTICS["p3"], SENSORS["p3"].resolution
+    assert chance_of_staying_below(4.0) == pytest.approx(0.53, abs=0.005)
+    assert chance_of_staying_below(p3.outlier_factor) == pytest.approx(2e-9, rel=0.2)
+    rounded = p3.outlier_factor + step / 2 / p3.standard_deviation
+    assert chance_of_staying_below(rounded) == pytest.approx(2e-4, rel=0.2)
+
+
+@pytest.mark.parametrize(("name", "errors"), [("I", 8.6), ("U", 5.8), ("p3", 7.4)])
+def test_kurtosis_lies_below_that_of_normal_noise(name, errors):
+    values = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / REPORTED)
+    assert values == pytest.approx(errors, abs=0.06)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from epv_env.plant.channels import SENSORS
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from identification.calibration.problem import calibration_problem
@@ -12,15 +13,16 @@ from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.fit.evidence import percentage_errors, with_settled_runs
 from identification.gap.fit.fitting_problem import FittingProblem, Hypothesis
 from identification.gap.fit.laws import KNOTS
+from identification.gap.judge.verdict import Ranking
 from identification.gap.prepare.prepared_plant import prepared
-from identification.recordings.recording import OUTPUTS
+from identification.recordings.recording import OUTPUTS, UNITS, Campaign
 from identification.replay.replay import responses, total_response_error
 from identification.validation import validate
 from identification.valve_gap.causes import effects, parameters
 from identification.valve_gap.valve import Valve
-from tests.identification.disturbances import round_pressures
+from tests.identification.disturbances import add_ripple, round_pressures
 from tests.identification.twins import twin
-from tests.identification.valve_gap.campaigns import all_but, campaign
+from tests.identification.valve_gap.campaigns import MANY, all_but, campaign
 
 NAMES = ("test1", "test4", "low_supply", "validation", "rest")
 
@@ -174,3 +176,39 @@ def test_every_run_finds_its_own_warmth():
     cold = problem.start(Hypothesis(causes=(heating,)), {"h_coil": H_COIL})
     found = start.centre + with_settled_runs(problem, cold).run_values[:, 0]
     assert found == pytest.approx(WARM, rel=0.01)
+
+
+RIPPLE = {name: 2.0 * SENSORS[name].noise for name in ("p1", "p2", "p3")}
+"""Twice the sensors' noise."""
+
+LONG = ("test1", "low_supply", "long_open", "high_voltage", "validation", "steps")
+"""Recordings of a campaign: enough blocks to see a ripple, and half as long as the whole suite."""
+
+
+def rippled(recorded: Campaign) -> Campaign:
+    return add_ripple(recorded, sd=RIPPLE, correlation_time=0.02, seed=1)
+
+
+def ranked(disturbed: Campaign) -> Ranking:
+    return rank_hypotheses(Valve(disturbed, without=all_but("eddy_current", *MANY)))
+
+
+def test_pressures_in_steps_of_50_mbar_show_no_gap():
+    found = ranked(round_pressures(campaign(*LONG), 0.05))
+    assert found.no_cause > found.unknown
+    assert max(found.inclusion.values()) < 0.05
+
+
+def test_a_slow_ripple_on_the_pressures_is_no_gap_and_is_filtered():
+    found = ranked(rippled(campaign(*LONG)))
+    assert found.no_cause > 0.5
+    plant = prepared(found.problem.plant)
+    seen = {
+        c.name: r.sd * c.known_noise for c, r in zip(plant.channels, plant.ripples, strict=True) if r
+    }
+    expected = {name: RIPPLE[name] * UNITS[name][1] for name in ("p2", "p3")}
+    assert seen == pytest.approx(expected, rel=0.25)
+
+
+def test_a_true_effect_is_found_under_a_slow_ripple():
+    assert ranked(rippled(campaign(*LONG, G_eddy=4e-3))).inclusion["eddy_current"] > 0.9
