@@ -9,7 +9,6 @@ from time import perf_counter
 from typing import Any
 
 from epv_env.common.command_line import NextStep
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, save_plant
 from identification.calibration.section import calibration_json, calibration_section
 from identification.confidence.section import confidence_json, confidence_section
@@ -21,9 +20,12 @@ from identification.quality.section import quality_section
 from identification.recordings.noise import campaign_steps
 from identification.recordings.recording import CampaignError, campaign_facts
 from identification.report.page import Section, Verdict, write_results
-from identification.sensitivity.collinearity import sensitivities_on_recordings
-from identification.sensitivity.one_at_a_time import sensitivities, studied_symbols
-from identification.sensitivity.section import sensitivity_json, sensitivity_section
+from identification.sensitivity import (
+    sensitivities_on_recordings,
+    sensitivity_json,
+    sensitivity_section,
+    studied_symbols,
+)
 from identification.validation import validation_json, validation_section
 
 PLANT_FILE = "plant.json"
@@ -69,13 +71,11 @@ def quality(identification: Identification) -> Result:
 
 
 def sensitivity(identification: Identification) -> Result:
-    """Section 5 at the report's conditions, and what the campaign's own recordings can separate."""
+    """Section 5 on the campaign's own recordings."""
     problem = identification.problem
     replay, symbols = problem.least_squares().replay, studied_symbols()
     outputs = sensitivities_on_recordings(replay, symbols, problem.noise)
-    errors = sensitivities(Parameters.nominal(), symbols)
-    content = {"sensitivity": sensitivity_json(errors, outputs)}
-    return [sensitivity_section(errors, outputs)], content
+    return [sensitivity_section(outputs)], {"sensitivity": sensitivity_json(outputs)}
 
 
 def calibration(identification: Identification) -> Result:

@@ -8,7 +8,6 @@ from epv_env.plant.consumption import SCENARIOS
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant
-from identification.sensitivity.one_at_a_time import changed_values
 from training.evaluation.scenarios import effect_levels
 
 JOINT = ("exact", "confidence", "ten_percent", "sensitive_ten_percent")
@@ -55,7 +54,8 @@ def parameters(plant: Plant) -> Iterator[Point]:
         if row.domain is None or row.group == "unmodelled" or symbol in effects:
             continue
         low, high = plant.parameters.domain(symbol)
-        minus, plus = changed_values(symbol, plant.parameters[symbol])
+        value = plant.parameters[symbol]
+        minus, plus = (0.9 * value, 1.1 * value) if value else (low, high)
         levels = {"-10 %": max(minus, low), "+10 %": min(plus, high), "least": low, "greatest": high}
         for level, value in levels.items():
             yield _changed_plant("parameters", symbol, level, {symbol: value})

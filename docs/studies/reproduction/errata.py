@@ -6,10 +6,11 @@ from itertools import combinations
 import numpy as np
 from scipy import stats
 
+from docs.studies.reproduction.one_at_a_time import PRINTED
 from epv_env.plant.channels import SENSORS
 from identification.quality.channel import DescriptiveStatistics
 from identification.recordings.recording import UNITS
-from identification.report_2003 import correlation_matrix, printed_errors, printed_total, total_error
+from identification.report_2003 import total_error
 
 HOLDS, ERRATUM = "holds", "slip"
 """Values of `status` in reproduce.json: the printed figures agree, or contradict each other."""
@@ -40,7 +41,7 @@ STATISTICS = {
 """Table 3 by channel."""
 
 CORRELATIONS = {
-    (REPORT_CHANNELS[row], REPORT_CHANNELS[column]): correlation_matrix()[row][column]
+    (REPORT_CHANNELS[row], REPORT_CHANNELS[column]): PRINTED["table4"]["matrix"][row][column]
     for row, column in combinations(range(len(REPORT_CHANNELS)), 2)
 }
 """Table 4, above the diagonal."""
@@ -89,7 +90,9 @@ def signal_to_noise(name: str, deviation: float) -> float:
 
 def recomputed_total(number: int) -> float:
     """Total error by eq. 21 [%] from the printed partial errors of Table 11 or 13."""
-    return float(total_error([np.array(test["partial"]) for test in printed_errors(number).values()]))
+    return float(
+        total_error([np.array(t["partial"]) for t in PRINTED[f"table{number}"]["tests"].values()])
+    )
 
 
 def _signal_to_noise(name: str) -> FigureCheck:
@@ -136,7 +139,7 @@ def _correlations() -> FigureCheck:
 
 
 def _total_error(number: int) -> FigureCheck:
-    printed, recomputed = printed_total(number), recomputed_total(number)
+    printed, recomputed = PRINTED[f"table{number}"]["total"], recomputed_total(number)
     return FigureCheck(
         where=f"Table {number}, total error [%]",
         printed=f"{printed:.4f}",
@@ -149,7 +152,7 @@ def _total_error(number: int) -> FigureCheck:
 
 def _improvement() -> FigureCheck:
     """The claim that rests on the total of Table 13."""
-    before, after = printed_total(11), (printed_total(13), recomputed_total(13))
+    before, after = PRINTED["table11"]["total"], (PRINTED["table13"]["total"], recomputed_total(13))
     printed, recomputed = (100 * (1 - total / before) for total in after)
     return FigureCheck(
         where="Tables 11 and 13, fall of the total error [% of it]",

@@ -12,9 +12,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from docs.studies.reproduction.fixed_step import simulate_fixed_step
+from docs.studies.reproduction.one_at_a_time import (
+    ErrorSensitivity,
+    printed_sensitivities,
+    sensitivities,
+)
 from epv_env.plant.parameters import Parameters, table
-from identification.report_2003 import ENERGISED_VOLTAGE, printed_sensitivities
-from identification.sensitivity.one_at_a_time import ErrorSensitivity, sensitivities, studied_symbols
+from identification.report_2003 import ENERGISED_VOLTAGE
+from identification.sensitivity import studied_symbols
 
 FIXED_STEP_VOLTAGE = 18.835
 """U_on [V] for the fixed step, whose scatter changes within 0.02 V: this voltage, 0.065 V below the

@@ -4,13 +4,13 @@ from functools import cache
 
 import pytest
 
-from epv_env.plant.parameters import Parameters, table
-from identification.report_2003 import printed_sensitivities
-from identification.sensitivity.one_at_a_time import (
+from docs.studies.reproduction.one_at_a_time import (
     changed_values,
+    printed_sensitivities,
     sensitivities,
-    studied_symbols,
 )
+from epv_env.plant.parameters import Parameters, table
+from identification.sensitivity import studied_symbols
 
 PNEUMATIC = (
     "dMVexh", "R", "alphaMV", "V3", "cPV", "alphaPV", "V2", "dMVin", "d1", "d2", "xPV0", "xPVmax",

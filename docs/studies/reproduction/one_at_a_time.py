@@ -4,8 +4,10 @@ Every variant of the parameters runs the report's test cases. Its total error (e
 nominal model says how far the responses move.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
@@ -25,6 +27,11 @@ from identification.report_2003 import (
     relative_error,
     total_error,
 )
+
+PRINTED: dict[str, Any] = json.loads(
+    Path(__file__).with_name("printed_2003.json").read_text(encoding="utf-8")
+)
+"""Tables that the report prints."""
 
 FACTORS = (0.9, 1.1)
 """The changes of Tables 8 and 9."""
@@ -99,9 +106,10 @@ class ErrorSensitivity:
         return {"minus10": minus, "plus10": plus, "sensitive": self.sensitive}
 
 
-def studied_symbols() -> list[str]:
-    """The parameters of Tables 6 and 7."""
-    return [symbol for symbol, row in table().items() if row.source in ("Table 6", "Table 7")]
+def printed_sensitivities(*tables: int) -> dict[str, tuple[float, float]]:
+    """Tables 8 and 9, or one of them: total errors for -10 % and +10 % by symbol [%]."""
+    rows = [row for table in tables or (8, 9) for row in PRINTED[f"table{table}"].items()]
+    return {symbol: (minus, plus) for symbol, (minus, plus) in rows}
 
 
 def changed_values(symbol: str, nominal: float) -> tuple[float, float]:
