@@ -48,7 +48,7 @@ PROMISES = {
     + "import asammdf, h5py, nptdms, pint, pyarrow, pymatreader",
     "video": "import epv_env, gymnasium as g\ne = g.make('EPValve-v0', render_mode='rgb_array')\n"
     "e.reset(); assert e.render().shape == (720, 1280, 3)",
-    "research": "from docs.examples.research import cleanrl_style, sb3_contrib, torchrl_ppo",
+    "research": "from docs.examples.research import sb3_contrib, torchrl_ppo",
     "docs": "import material, mkdocs, mkdocstrings\nfrom docs.scripts import hooks, unit_brackets\n"
     "for write in hooks.GENERATED.values(): write()",
 }

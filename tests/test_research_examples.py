@@ -12,7 +12,6 @@ pytestmark = [pytest.mark.training, pytest.mark.slow]
 ROOT = Path(__file__).parents[1]
 EXAMPLES = {
     "sb3_contrib": ("sb3_contrib", "400", "'RecurrentPPO': -"),
-    "cleanrl_style": ("torch", "9000", "mean reward of a step: -"),
     "torchrl_ppo": ("torchrl", "2000", "mean reward of a step: -"),
 }
 """Library that a script needs, its steps, and a part of what it prints."""
