@@ -1,4 +1,4 @@
-"""Compute the report's tables again, and check its printed figures against each other.
+"""Compute the report's tables again.
 
     python -m docs.studies.reproduction.study
 
@@ -9,14 +9,12 @@ Table 12.
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from docs.studies.reproduction.errata import ERRATUM, figure_checks
 from docs.studies.reproduction.sensitivity_tables import run_one_at_a_time, sensitivity_tables
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_json
@@ -44,7 +42,6 @@ def reproduce(identification: Identification) -> dict[str, Any]:
     return {
         **sensitivity_tables(run_one_at_a_time()),
         "virtual_bench": {"tables2to4": quality_json(quality), **_bench(identification)},
-        "slips": [asdict(check) for check in figure_checks()],
     }
 
 
@@ -71,7 +68,6 @@ def page_parts(results: Mapping[str, Any]) -> dict[str, str]:
     return {
         "agreement": _agreement(results["comparison"]),
         "estimates": _estimates(results["virtual_bench"]),
-        "errata": _errata(results["slips"]),
     }
 
 
@@ -110,15 +106,6 @@ def _estimates(bench: Mapping[str, Any]) -> str:
         )
     widths = ["Table 14 [%]", "eq. 23 [%]", "covering 95 % [%]"]
     return table(["", "Start", "Truth", *METHODS, *widths], rows)
-
-
-def _errata(checks: Sequence[Mapping[str, str]]) -> str:
-    rows = [
-        [check["where"], check["printed"], check["recomputed"].partition(":")[0]]
-        for check in checks
-        if check["status"] == ERRATUM
-    ]
-    return table(["Where", "Printed", "Recomputed"], rows)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
