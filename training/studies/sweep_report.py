@@ -1,14 +1,13 @@
-"""Tables and pictures of a sweep: shares that leave the band, and excursions, by what is changed."""
+"""Tables of a sweep: shares that leave the band, and excursions, by what is changed."""
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import pandas as pd
-from matplotlib.figure import Figure
 
 from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
-from training.evaluation.plots import COLOURS, in_words, plt
+from training.evaluation.plots import in_words
 from training.studies.sweep_designs import ONE_AT_A_TIME, Point
 
 NAMED_LEVELS = 3
@@ -16,9 +15,6 @@ NAMED_LEVELS = 3
 
 RANGE_ENDS = ("least", "greatest", "top")
 """Levels at the ends of a range, beyond what a sound valve has; they are counted apart."""
-
-SHOWN_LEVELS = {"parameters": ("-10 %", "+10 %"), "effects": ("typical",)}
-"""Levels that a design's picture shows; of the other designs all."""
 
 HEADINGS = {
     "level": "plants",
@@ -102,35 +98,3 @@ def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
                     }
                 )  # fmt: skip
     return pd.DataFrame(table)
-
-
-def share_figure(points: pd.DataFrame, designs: Sequence[str]) -> Figure:
-    """Share that leaves under each controller with its exact 95 % interval, where a change hurts it.
-
-    points: of `point_table`. designs: those shown, each at its SHOWN_LEVELS. The legend counts the
-    changes of one thing that hurt; regions are drawn for every controller.
-    """
-    some: Any = points.assign(hurts=hurts(points), region=points["design"] == "regions")
-    shown = [
-        row["design"] in designs and row["level"] in SHOWN_LEVELS.get(row["design"], (row["level"],))
-        for row in some.to_dict("records")
-    ]
-    some = some[shown].assign(
-        label=lambda rows: rows["factor"].map(in_words) + ": " + rows["level"].map(in_words)
-    )
-    drawn: Any = some[some["hurts"] | some["region"]]
-    drawn = drawn.sort_values(["region", "left"], ascending=False, kind="stable")
-    labels = list(dict.fromkeys(drawn["label"]))
-    figure, axes = plt.subplots(figsize=(7.2, 1.6 + 0.27 * len(labels)), layout="constrained")
-    for name, colour in zip(dict.fromkeys(some["controller"]), COLOURS, strict=False):
-        mine, tried = (rows[rows["controller"] == name] for rows in (drawn, some[~some["region"]]))
-        places = [labels.index(label) for label in mine["label"]]
-        axes.hlines(places, 100 * mine["left_low"], 100 * mine["left_high"], color=colour, alpha=0.5)
-        text = f"{name}: {tried['hurts'].sum()} of {len(tried)} changes hurt"
-        axes.plot(100 * mine["left"], places, "o", ms=5, color=colour, label=text)
-    axes.set(xlabel="episodes that leave ±500 mbar [%], exact 95 % intervals", xlim=(0, 101))
-    axes.set_yticks(range(len(labels)), labels, fontsize=9)
-    axes.set_ylim(len(labels) - 0.4, -0.6)
-    axes.grid(alpha=0.3, axis="x")
-    figure.legend(ncols=2, loc="outside upper center", frameon=False)
-    return figure
