@@ -18,13 +18,13 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.settings import make_settings
-from training.studies.sweep_designs import (
+from training.studies.sweep import (
     ONE_AT_A_TIME,
     chosen_points,
+    harmful_changes,
     parameters,
     regions,
 )
-from training.studies.sweep_report import harmful_changes
 
 pytestmark = pytest.mark.training
 

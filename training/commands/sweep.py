@@ -23,8 +23,13 @@ from epv_env.vector_entry import check_device
 from training.evaluation.batches import Batch, run_batches
 from training.evaluation.named import HELP, named_controllers
 from training.evaluation.seeds import SWEEP_SEED, check_first_seed
-from training.studies.sweep_designs import DESIGNS, chosen_points
-from training.studies.sweep_report import harmful_changes, point_table, region_table
+from training.studies.sweep import (
+    DESIGNS,
+    chosen_points,
+    harmful_changes,
+    point_table,
+    region_table,
+)
 
 DEFAULT = ("extrapolating hysteresis", "adaptive pulse", "PWM")
 """Controllers that are swept unless others are named: one of each kind."""
