@@ -15,7 +15,11 @@ from typing import Any
 import numpy as np
 
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from docs.studies.reproduction.sensitivity_tables import run_one_at_a_time, sensitivity_tables
+from docs.studies.reproduction.one_at_a_time import (
+    agreement_with_printed,
+    printed_sensitivities,
+    sensitivities,
+)
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_json
 from epv_env.plant.parameters import Parameters, confidence_intervals
@@ -28,6 +32,7 @@ from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
 from identification.replay.replay import responses
 from identification.replay.response_blocks import errors_as_json, response_figure
+from identification.sensitivity import studied_symbols
 
 FOLDER = Path(__file__).parent
 
@@ -40,9 +45,19 @@ def reproduce(identification: Identification) -> dict[str, Any]:
     campaign = identification.campaign
     quality = assess_recording(campaign.with_role("quality")[0], campaign.pressure)
     return {
-        **sensitivity_tables(run_one_at_a_time()),
+        **sensitivity_tables(),
         "virtual_bench": {"tables2to4": quality_json(quality), **_bench(identification)},
     }
+
+
+def sensitivity_tables() -> dict[str, Any]:
+    """JSON-ready 'table8' and 'table9' [%], and 'comparison' with the printed ones."""
+    rows = sensitivities(Parameters.nominal(), studied_symbols())
+    tables = {
+        f"table{number}": {s: rows[s].as_json() for s in printed_sensitivities(number)}
+        for number in (8, 9)
+    }
+    return {**tables, "comparison": agreement_with_printed(rows)}
 
 
 def _bench(identification: Identification) -> dict[str, Any]:
@@ -71,19 +86,13 @@ def page_parts(results: Mapping[str, Any]) -> dict[str, str]:
     }
 
 
-def _agreement(comparison: Mapping[str, Any]) -> str:
-    rows = []
-    for title, key in (("fixed step of 0.5 ms", "fixed_step"), ("exact stops", "exact")):
-        found = comparison[key]
-        rows.append(
-            [
-                f"{title}, {found['U_on_V']:g} V",
-                f"{found['reproduced']} of {found['figures']}",
-                f"all but {', '.join(found['classes_differ'])}" if found["classes_differ"] else "all",
-                f"{found['worst_factor']:.3g}",
-            ]
-        )
-    return table(["", "Reproduced", "Classes as printed", "Farthest figure, factor"], rows)
+def _agreement(found: Mapping[str, Any]) -> str:
+    row = [
+        f"{found['reproduced']} of {found['figures']}",
+        f"all but {', '.join(found['classes_differ'])}",
+        f"{found['worst_factor']:.3g}",
+    ]
+    return table(["Reproduced", "Classes as printed", "Farthest figure, factor"], [row])
 
 
 def _estimates(bench: Mapping[str, Any]) -> str:
