@@ -9,8 +9,8 @@ from typing import Any
 from epv_env.common.command_line import NextStep
 from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant, save_plant
-from identification.calibration.section import calibration_json, calibration_section
-from identification.confidence.section import confidence_json, confidence_section
+from identification.calibration.calibrate import calibration_json, calibration_section
+from identification.confidence.confidence import confidence_json, confidence_section
 from identification.pipeline.identification import ESTIMATOR, Identification
 from identification.pipeline.summary import summary_section
 from identification.quality.assessment import assess_recording
