@@ -2,7 +2,7 @@
 
     python -m docs.studies.reproduction.study
 
-writes reproduce.json, a picture and the tables of README.md. The report is SCL-001/2003. Its
+writes reproduce.json and the tables of README.md. The report is SCL-001/2003. Its
 recordings were never published: Tables 2 to 4 and 10 to 15 come from a virtual bench whose truth is
 Table 12.
 """
@@ -31,7 +31,7 @@ from identification.pipeline.identification import Identification
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
 from identification.replay.replay import responses
-from identification.replay.response_blocks import errors_as_json, response_figure
+from identification.replay.response_blocks import errors_as_json
 from identification.sensitivity import studied_symbols
 
 FOLDER = Path(__file__).parent
@@ -126,8 +126,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     results = reproduce(identification)
     write_json(options.out / "reproduce.json", results)
     fill(options.out / PAGE, page_parts(results))
-    picture = response_figure(identification.calibration.after[METHODS[0]][0])
-    picture.savefig(options.out / "calibration.png", dpi=100, bbox_inches="tight")
     return 0
 
 
