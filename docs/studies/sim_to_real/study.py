@@ -274,7 +274,7 @@ def figures(name: Any, rows: pd.DataFrame) -> dict[str, Any]:
     return {
         "case": name[0], "arm": name[1], "seeds": len(by_seed), "left_percent": left, "left_low": low,
         "left_high": high, "rms_mbar": error, "switchings_per_s": often,
-        "cell": f"{left:.1f} ({low:.1f}–{high:.1f}), {error:.0f}, {often:.1f}",
+        "cell": f"{left:.1f} ({low:.1f}–{high:.1f})",
     }  # fmt: skip
 
 
