@@ -65,6 +65,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
     action_form: ClassVar[type[OnOff] | type[PWM]]
+    most_envs: ClassVar[int] = 1_000_000
+    """More are a slip, and would fill the memory."""
 
     def __init__(
         self,
@@ -79,7 +81,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ):
-        check_count("num_envs", num_envs, most=1_000_000)  # more are a slip, and would fill the memory
+        check_count("num_envs", num_envs, most=self.most_envs)
         if threads is not None:
             check_count("threads", threads)
         if render_mode is not None:

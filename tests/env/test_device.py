@@ -17,10 +17,11 @@ import pytest
 
 import epv_env  # noqa: F401 - registers the ids
 from epv_env.actions import OnOff
-from epv_env.device.kernels import Batch, restart, step_kernel
+from epv_env.device.kernels import INSTEAD, Batch, step_kernel
 from epv_env.device.random import draw_normals, philox
-from epv_env.device.vector_env import blank_results
+from epv_env.device.vector_env import blank_results, copy_actions
 from epv_env.period import rules_of
+from epv_env.plant.lanes import N_STATE
 from epv_env.signals import OptionError
 
 N, PERIODS = 4, 12
@@ -44,13 +45,24 @@ def made(case: str, device: str) -> Any:
 def state_of(envs: Any) -> np.ndarray:
     """The true state, (N_STATE, n) [SI]."""
     batch = getattr(envs.unwrapped, "_batch", None)
-    return batch.state.copy_to_host() if batch else np.array(envs.task.valves.tables.state)
+    return batch.numbers[:N_STATE].copy_to_host() if batch else np.array(envs.task.valves.tables.state)
 
 
 def final_of(infos: dict[str, Any]) -> np.ndarray:
     """The figures and the last observation of the episodes that ended, (n - 1, all)."""
     figures = np.array([value for _, value in sorted(infos["final_info"].items())], dtype=float)
     return np.column_stack([figures[:, :-1].T, np.stack(infos["final_obs"][:-1])])
+
+
+def compiles(kernel: Any, arguments: tuple[Any, ...], monkeypatch: Any) -> bool:
+    """Whether a kernel becomes code for compute capability 9.0, without a driver."""
+    pytest.importorskip("numba_cuda", reason="no compiler for accelerators: install the extra gpu")
+    dispatcher, cuda = import_module("numba.cuda.dispatcher"), import_module("numba.cuda")
+    h100 = SimpleNamespace(compute_capability=(9, 0))
+    monkeypatch.setattr(dispatcher, "get_current_device", lambda: h100)
+    types = tuple(map(numba.typeof, arguments))
+    ptx, _ = cuda.compile_ptx(kernel.py_func, types, cc=h100.compute_capability)
+    return ".target sm_90" in ptx
 
 
 def rollout(case: str, device: str) -> dict[str, np.ndarray]:
@@ -109,24 +121,16 @@ def test_random_numbers_are_those_of_the_published_generator():
     np.testing.assert_allclose(np.cov(drawn.T), np.eye(4), atol=0.04)
 
 
-@pytest.mark.parametrize("extended", [False, True], ids=["nominal", "extended"])
-def test_the_kernels_compile_for_an_accelerator(extended, monkeypatch):
-    pytest.importorskip("numba_cuda", reason="no compiler for accelerators: install the extra gpu")
-    dispatcher, cuda = import_module("numba.cuda.dispatcher"), import_module("numba.cuda")
-    h100 = SimpleNamespace(compute_capability=(9, 0))
-    monkeypatch.setattr(dispatcher, "get_current_device", lambda: h100)  # needs no driver then
+@pytest.mark.parametrize("with_effects", [False, True], ids=["nominal", "with effects"])
+def test_the_kernels_compile_for_an_accelerator(with_effects, monkeypatch):
     task = made("ordinary", "cpu").task
-    b, r = Batch(*(task.memory[name] for name in Batch._fields)), blank_results(task.n)
-    rules = rules_of(task.settings)
+    b, r = Batch.of(task.memory), blank_results(task.n)
     key, actions, limits = np.uint64(1), np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
-    arguments = {
-        step_kernel(OnOff.rule, extended): (b, r, rules, actions, 1, key, limits, 2e-4),
-        restart: (b, b, r, key, True),
-    }
-    for kernel, values in arguments.items():
-        types = tuple(map(numba.typeof, values))
-        ptx, _ = cuda.compile_ptx(kernel.py_func, types, cc=h100.compute_capability)
-        assert ".target sm_90" in ptx
+    arguments = (b, b, r, rules_of(task.settings), actions, 1, key, limits, 2e-4, INSTEAD)
+    assert compiles(step_kernel(OnOff.rule, with_effects), arguments, monkeypatch)
+    for kind in (np.int64, np.float32, np.bool_):
+        strided = np.zeros((task.n, 2), dtype=kind)[:, 0]
+        assert compiles(copy_actions, (strided, actions), monkeypatch)
 
 
 def test_a_device_that_is_not_there_is_refused():
