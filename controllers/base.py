@@ -56,9 +56,11 @@ class OneValve:
 
     Its memory of a valve is a record, whose zeros mean that an episode begins. The compiled function
     `decide(memory, observation, constants, period)` of its file changes memory and observation
-    (entries,), and gives 1 (coil on) or 0. C is translated from what it calls.
+    (entries,), and gives 1 (coil on) or 0. C is translated from what it calls, and an accelerator
+    compiles it, too.
     """
 
+    decide: ClassVar[Any]
     decide_all: ClassVar[Any]
     """`decide` over a batch: (memory, observations, constants, period, actions). Each file has its own
     loop: numba keeps none on disk that is handed the function to call."""

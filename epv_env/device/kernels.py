@@ -6,7 +6,7 @@ tables of many valves; a thread hands them its valve's columns, and working memo
 
 import math
 import warnings
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
@@ -23,6 +23,8 @@ from epv_env.plant.primitives import exact
 from epv_env.plant.stepping import locate_event, try_step
 from epv_env.plant.valves import U_ROW, acting
 from epv_env.result import FAILED, REWARD
+from epv_env.signals import OptionError
+from epv_env.task import LimitingTask
 
 THREADS = 128
 """Threads of a block."""
@@ -40,7 +42,8 @@ COEFFICIENTS = N_STATE
 EFFECTS = COEFFICIENTS + N_COEFFICIENT
 WITH_EFFECTS = EFFECTS + N_EFFECT
 DELAY, ACTING_U, DELAY_LEFT = range(WITH_EFFECTS + 1, WITH_EFFECTS + 4)
-COIL_ENERGY = State._fields.index("coil_energy")
+P2, COIL_ENERGY = (State._fields.index(name) for name in ("p2", "coil_energy"))
+"""Rows of the table, the state being the first ones."""
 
 
 class Batch(NamedTuple):
@@ -56,9 +59,13 @@ class Batch(NamedTuple):
     """(rows of NUMBERS, n) [SI]."""
 
     @classmethod
-    def of(cls, memory: Mapping[str, np.ndarray]) -> "Batch":
-        """Of `LimitingTask.memory`: NumPy's arrays."""
-        n = len(memory["episodes"])
+    def of(cls, task: LimitingTask) -> "Batch":
+        """Of a task on the host: NumPy's arrays. Raises OptionError for what a device cannot follow."""
+        if any(task._signals):
+            raise OptionError(
+                "a device follows no recordings and moving targets: leave them out, or use the CPU"
+            )
+        memory, n = task.memory, task.n
         rows = [np.atleast_2d(memory[name])[:, :n] for name in NUMBERS]
         numbers = np.concatenate(rows, dtype=float)
         return cls(memory["episodes"], memory["progress"], memory["sensors"][:n], numbers)

@@ -105,12 +105,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
             if each is not None:
                 self._rngs[i] = np_random(each)[0]
         self._begin(np.arange(self.task.n), options)
-        if any(self.task._signals):
-            raise OptionError(
-                "a device follows no recordings and moving targets: leave them out, or use the CPU"
-            )
+        starts = Batch.of(self.task)
         self._key = self._rngs[0].integers(2**64, dtype=np.uint64)
-        starts = Batch.of(self.task.memory)
         self._with_effects = bool(np.any(starts.numbers[WITH_EFFECTS]))
         self._starts = on_device(starts)
         self._batch = Batch(*(_like(array, self.num_envs) for array in starts))
@@ -179,7 +175,7 @@ def _like(array: np.ndarray, n: int) -> Any:
 
 
 def on_device(arrays: Any) -> Any:
-    """A tuple, or named tuple, of the device's arrays for NumPy's; numbers and tuples in it stay such."""
+    """A named tuple with the device's arrays for NumPy's, at any depth; numbers stay numbers."""
     parts = [
         on_device(each) if isinstance(each, tuple)
         else cuda.to_device(each) if isinstance(each, np.ndarray)

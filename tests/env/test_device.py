@@ -124,7 +124,7 @@ def test_random_numbers_are_those_of_the_published_generator():
 @pytest.mark.parametrize("with_effects", [False, True], ids=["nominal", "with effects"])
 def test_the_kernels_compile_for_an_accelerator(with_effects, monkeypatch):
     task = made("ordinary", "cpu").task
-    b, r = Batch.of(task.memory), blank_results(task.n)
+    b, r = Batch.of(task), blank_results(task.n)
     key, actions, limits = np.uint64(1), np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
     arguments = (b, b, r, rules_of(task.settings), actions, 1, key, limits, 2e-4, INSTEAD)
     assert compiles(step_kernel(OnOff.rule, with_effects), arguments, monkeypatch)
