@@ -11,10 +11,12 @@ from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cuda, float64, int64
+from numba import cuda, float32, float64, int64
 from numba.core.errors import NumbaPerformanceWarning
 
+from epv_env.actions import on_off
 from epv_env.device.random import draw_normals, philox
+from epv_env.observation import LAYOUT
 from epv_env.period import begin_period, end_period, observe
 from epv_env.plant.equations import State
 from epv_env.plant.integrate import MAX_STEPS, NONE, STEPS, VALVE, WAITING, go_on
@@ -22,7 +24,7 @@ from epv_env.plant.lanes import EVENT, N_COEFFICIENT, N_EFFECT, N_INPUT, N_ROW, 
 from epv_env.plant.primitives import exact
 from epv_env.plant.stepping import locate_event, try_step
 from epv_env.plant.valves import U_ROW, acting
-from epv_env.result import FAILED, REWARD
+from epv_env.result import FAILED, N_FIGURE, REWARD
 from epv_env.signals import OptionError
 from epv_env.task import LimitingTask
 
@@ -44,6 +46,10 @@ WITH_EFFECTS = EFFECTS + N_EFFECT
 DELAY, ACTING_U, DELAY_LEFT = range(WITH_EFFECTS + 1, WITH_EFFECTS + 4)
 P2, COIL_ENERGY = (State._fields.index(name) for name in ("p2", "coil_energy"))
 """Rows of the table, the state being the first ones."""
+
+
+ENTRIES = len(LAYOUT)
+"""Of an observation."""
 
 
 class Batch(NamedTuple):
@@ -159,7 +165,7 @@ def one_period(with_effects: bool) -> Any:
     noise (1, 1, 4) [-]; figures (N_FIGURE, 1) and observation (1, entries) are its results.
     """
 
-    @cuda.jit(device=True)
+    @exact
     def take(v, rules, on_time, action, noise, longest, figures, observation):
         before, state = cuda.local.array((N_STATE, 1), float64), v.numbers[:N_STATE]
         inputs, duration = cuda.local.array((4, N_INPUT, 1), float64), cuda.local.array((4, 1), float64)
@@ -167,6 +173,9 @@ def one_period(with_effects: bool) -> Any:
         asked, shown = cuda.local.array(1, float64), cuda.local.array(1, float64)
         work, queue = cuda.local.array((N_ROW, 1), float64), cuda.local.array((4, 2), int64)
         asked[0], shown[0] = on_time, action
+        for part in range(2):
+            for row in range(N_INPUT):  # no period sets them all
+                inputs[part, row, 0] = 0.0
         begin_period(v.episodes, v.progress, rules, state, before, inputs, duration, lowest, highest,
                      asked, shown, figures, 0, 1)  # fmt: skip
         parts = delayed_parts(inputs, duration, v.numbers)
@@ -231,3 +240,49 @@ def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
             begin_episode(b, starts, r, key, i)
 
     return step
+
+
+@cache
+def episodes_kernel(
+    decide: Callable[..., Any], memory: np.dtype, count: Callable[..., Any], with_effects: bool
+) -> Any:
+    """The kernel that runs whole episodes of the on/off environment under a controller.
+
+    A lane takes an episode from the queue, runs it to its end and takes the next one. What is drawn
+    follows from the episode's key, so lanes do not matter.
+
+    decide: as of a controller of one valve, with its memory's record (controllers/base.py). count: of a
+    period (training/evaluation/metrics.py). with_effects: whether some valves have effects.
+    noise: (n, more than periods, 4) [-], or empty: drawn here. restart: period before which the
+    controller forgets everything. record (periods, 2, n) takes decisions and p2 [Pa], unless it is empty.
+    """
+    take = one_period(with_effects)
+
+    @cuda.jit
+    def run(b, keys, rules, constants, blank, noise, periods, restart, longest, queue, meters, record):
+        own, drawn = cuda.local.array(1, memory), cuda.local.array((1, 1, 4), float64)
+        figures = cuda.local.array((N_FIGURE, 1), float64)
+        seen = cuda.local.array((1, ENTRIES), float32)
+        period, settling_time = rules[0].control_period, rules[0].settling_time
+        while True:
+            i = cuda.atomic.add(queue, 0, 1)  # type: ignore[attr-defined]
+            if i >= len(meters):
+                break
+            v, e, m = alone(b, i), b.episodes[i], meters[i]
+            observe(e, seen[0])
+            for k in range(periods):
+                if k == 0 or k == restart:
+                    own[0] = blank[0]
+                action = decide(own[0], seen[0], constants, period)
+                draw_normals(keys[i], 0, 0, k + 1, NOISE, e.noise, drawn[0, 0])
+                for c in range(noise.shape[2]):
+                    drawn[0, 0, c] = e.noise * noise[i, k + 1, c]
+                on_time, share, _ = on_off(action, period, 1)
+                take(v, rules, on_time, share, drawn, longest, figures, seen)
+                count(m, figures, 0, v.numbers[COIL_ENERGY, 0], period, settling_time)
+                if len(record) > 0:
+                    record[k, 0, i], record[k, 1, i] = action, v.numbers[P2, 0]
+                if m.failed > 0.0:
+                    break
+
+    return run

@@ -174,15 +174,14 @@ def _like(array: np.ndarray, n: int) -> Any:
     return cuda.device_array(shape, dtype=kind)
 
 
-def on_device(arrays: Any) -> Any:
-    """A named tuple with the device's arrays for NumPy's, at any depth; numbers stay numbers."""
-    parts = [
-        on_device(each) if isinstance(each, tuple)
-        else cuda.to_device(each) if isinstance(each, np.ndarray)
-        else each
-        for each in arrays
-    ]  # fmt: skip
-    return type(arrays)(*parts)
+def on_device(value: Any) -> Any:
+    """NumPy's arrays in tuples of any depth as arrays of the device; numbers stay what they are."""
+    if isinstance(value, np.ndarray):
+        return cuda.to_device(value)
+    if not isinstance(value, tuple):
+        return value
+    parts = map(on_device, value)
+    return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
 
 
 def blank_results(n: int) -> Results:

@@ -27,7 +27,7 @@ BATCH_EPISODES = 512
 ones."""
 
 
-DEVICE_EPISODES = 8192
+DEVICE_EPISODES = 262_144
 """The same on an accelerator, which wants many."""
 
 
@@ -48,7 +48,7 @@ class Batch:
     restart_s: float | None = None
     """When the control unit restarts [s]; None: never."""
     device: str = "cpu"
-    """Of the plants: "cpu", or "cuda" for an accelerator, whose noise is another."""
+    """On which they run: "cpu", or "cuda" for an accelerator, whose noise is another."""
 
 
 def in_batches(whole: Batch) -> list[Batch]:
@@ -79,7 +79,7 @@ def run_batches(
         batches: with names of their own.
         controllers: by label.
         journal: parts that are finished; new ones are added.
-        workers: processes; None: one for each core.
+        workers: processes; None: one for each core. On an accelerator they only draw the starts.
         what: name of the progress bar.
     """
     parts = [in_batches(whole) for whole in batches]
@@ -87,7 +87,10 @@ def run_batches(
     missing = [p for each in parts for p in each if journal is None or p.name not in journal]
     longest_first = sorted(missing, key=lambda part: -part.episodes * part.duration)
     # Processes, not threads: most of an episode is NumPy on short arrays, which holds Python's lock.
-    pool: Any = Parallel(n_jobs=workers or available_cores(), return_as="generator_unordered")
+    processes = workers or available_cores()
+    if any(part.device != "cpu" for part in missing):
+        processes = 1
+    pool: Any = Parallel(n_jobs=processes, return_as="generator_unordered")
     jobs = (delayed(_run)(part, controllers[part.controller]) for part in longest_first)
     with tqdm(
         total=sum(part.episodes for part in missing), desc=what, unit="episode", file=sys.stderr,
@@ -132,16 +135,21 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     own: Any = deepcopy(controller)
     settings = {"threads": 1, "control_period": batch.options.get("control_period")}
     known = {name: v for name, v in settings.items() if v is not None and hasattr(own, name)}
-    seeds = list(range(batch.first_seed, batch.first_seed + batch.episodes))
-    device: dict[str, Any] = {}
-    if batch.device != "cpu":  # each episode begins with its own seed
-        device = {"device": batch.device, "to_host": True, "starts": batch.episodes}
+    run: Callable[..., EpisodeMetrics] = run_episodes
+    options = {"threads": 1, **batch.options}
+    if batch.device != "cpu":
+        from training.evaluation import on_device  # compiles for an accelerator: of no use elsewhere
+
+        if on_device.takes(own):
+            run = on_device.run_episodes
+        else:  # each episode begins with its own seed
+            options |= {"device": batch.device, "to_host": True, "starts": batch.episodes}
     with threadpool_limits(1):  # the figures must not depend on the threads of the linear algebra
-        metrics = run_episodes(
+        metrics = run(
             replace(own, **known) if known else own,
-            seeds=seeds,
+            seeds=range(batch.first_seed, batch.first_seed + batch.episodes),
             duration=batch.duration,
-            options={"threads": 1, **device, **batch.options},
+            options=options,
             restart_s=batch.restart_s,
         )
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}

@@ -58,7 +58,7 @@ def begin_episodes(
 def run_episodes(
     controller: Controller,
     *,
-    seeds: list[int],
+    seeds: Sequence[int],
     duration: float,
     options: dict[str, Any],
     restart_s: float | None = None,
