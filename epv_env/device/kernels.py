@@ -34,9 +34,9 @@ THREADS = 128
 NOISE, EPISODE = 0, 1
 """Last part of a counter: what is drawn."""
 
-KEEP, INSTEAD, AFTER = range(3)
-"""What becomes of an episode that has ended: it runs on, the next one begins instead of the valve's next
-step, or after the step that ended it."""
+INSTEAD, AFTER, KEEP = range(3)
+"""What becomes of an episode that has ended, in the order of Gymnasium's AutoresetMode: the next one
+begins instead of the valve's next step, or after the step that ended it, or it runs on."""
 
 NUMBERS = ("state", "coefficients", "effects", "with_effects", "delay", "acting_U", "delay_left")
 """Arrays of `LimitingTask.memory` that are rows of one table here, in their order."""
@@ -63,6 +63,8 @@ class Batch(NamedTuple):
     """Records of SENSOR_RECORD (n,)."""
     numbers: Any
     """(rows of NUMBERS, n) [SI]."""
+    keys: Any
+    """Of the random numbers that are drawn on the device, (n,)."""
 
     @classmethod
     def of(cls, task: LimitingTask) -> "Batch":
@@ -74,7 +76,8 @@ class Batch(NamedTuple):
         memory, n = task.memory, task.n
         rows = [np.atleast_2d(memory[name])[:, :n] for name in NUMBERS]
         numbers = np.concatenate(rows, dtype=float)
-        return cls(memory["episodes"], memory["progress"], memory["sensors"][:n], numbers)
+        keys = memory["noise"][:, 1, 0].copy().view(np.uint64)  # all zero where there is no noise
+        return cls(memory["episodes"], memory["progress"], memory["sensors"][:n], numbers, keys)
 
 
 class Results(NamedTuple):
@@ -109,12 +112,19 @@ def launch(kernel: Any, n: int, *arguments: Any) -> None:
     configured(*arguments)
 
 
+@cuda.jit
+def copy_actions(actions, asked):
+    """Actions (n,) of any real type and stride as float64: the step is compiled for no other."""
+    i = cuda.grid(1)  # type: ignore[call-arg]
+    if i < len(asked):
+        asked[i] = actions[i]
+
+
 @exact
 def alone(b, i):
     """The Batch of valve i alone, which shares the memory."""
-    return Batch(
-        b.episodes[i : i + 1], b.progress[i : i + 1], b.sensors[i : i + 1], b.numbers[:, i : i + 1]
-    )
+    episode, progress, sensors = b.episodes[i : i + 1], b.progress[i : i + 1], b.sensors[i : i + 1]
+    return Batch(episode, progress, sensors, b.numbers[:, i : i + 1], b.keys[i : i + 1])
 
 
 @exact
@@ -191,14 +201,14 @@ def one_period(with_effects: bool) -> Any:
 
 
 @exact
-def begin_episode(b, starts, r, key, i):
+def begin_episode(b, starts, r, i):
     """Begin an episode of valve i: its own start at first, later one that is drawn from all starts."""
     j, count = i % len(starts.episodes), np.uint64(r.started[i])
     if r.started[i] > 0:
-        drawn, _, _, _ = philox(key, np.uint64(i), np.uint64(0), count, np.uint64(EPISODE))
+        drawn, _, _, _ = philox(b.keys[i], np.uint64(i), np.uint64(0), count, np.uint64(EPISODE))
         j = np.int64(drawn % np.uint64(len(starts.episodes)))
     b.episodes[i], b.progress[i] = starts.episodes[j], starts.progress[j]
-    b.sensors[i] = starts.sensors[j]
+    b.sensors[i], b.keys[i] = starts.sensors[j], starts.keys[j]
     for row in range(b.numbers.shape[0]):
         b.numbers[row, i] = starts.numbers[row, j]
     r.started[i] += 1
@@ -209,25 +219,25 @@ def begin_episode(b, starts, r, key, i):
 def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
     """The kernel that takes one control period of all valves; some may have effects, or none.
 
-    rule: of one action (actions.py). ending: KEEP, INSTEAD or AFTER.
+    rule: of one action (actions.py). ending: INSTEAD, AFTER or KEEP.
     """
     take = one_period(with_effects)
 
     @cuda.jit
-    def step(b, starts, r, rules, actions, slots, key, limits, longest, ending):
+    def step(b, starts, r, rules, actions, slots, limits, longest, ending):
         i = cuda.grid(1)  # type: ignore[call-arg]
         if i >= len(b.episodes):
             return
         r.begun[i] = ending == INSTEAD and r.ended[i]
         if r.begun[i]:
-            begin_episode(b, starts, r, key, i)
+            begin_episode(b, starts, r, i)
             r.reward[i] = 0.0
             for row in range(r.figures.shape[0]):
                 r.figures[row, i] = 0.0
             r.terminated[i] = r.truncated[i] = r.ended[i] = False
             return
         e, noise = b.episodes[i], cuda.local.array((1, 1, 4), float64)
-        draw_normals(key, i, r.started[i], e.steps + 1, NOISE, e.noise, noise[0, 0])
+        draw_normals(b.keys[i], i, r.started[i], e.steps + 1, NOISE, e.noise, noise[0, 0])
         on_time, action, valid = rule(float(actions[i]), rules[0].control_period, slots)
         take(alone(b, i), rules, on_time, action, noise, longest, r.figures[:, i : i + 1],
              r.observation[i : i + 1])  # fmt: skip
@@ -237,7 +247,7 @@ def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
         if ending == AFTER and r.ended[i]:
             for k in range(r.observation.shape[1]):
                 r.final_observation[i, k] = r.observation[i, k]
-            begin_episode(b, starts, r, key, i)
+            begin_episode(b, starts, r, i)
 
     return step
 
@@ -251,15 +261,13 @@ def episodes_kernel(
     A lane takes an episode from the queue, runs it to its end and takes the next one. What is drawn
     follows from the episode's key, so lanes do not matter.
 
-    decide: as of a controller of one valve, with its memory's record (controllers/base.py). count: of a
-    period (training/evaluation/metrics.py). with_effects: whether some valves have effects.
-    noise: (n, more than periods, 4) [-], or empty: drawn here. restart: period before which the
-    controller forgets everything. record (periods, 2, n) takes decisions and p2 [Pa], unless it is empty.
+    decide: of a controller of one valve, with its memory's record (controllers/base.py). count: of an
+    episode's period (training/evaluation/metrics.py). with_effects: whether some valves have effects.
     """
     take = one_period(with_effects)
 
     @cuda.jit
-    def run(b, keys, rules, constants, blank, noise, periods, restart, longest, queue, meters, record):
+    def run(b, rules, constants, blank, noise, periods, restart, longest, queue, meters, record):
         own, drawn = cuda.local.array(1, memory), cuda.local.array((1, 1, 4), float64)
         figures = cuda.local.array((N_FIGURE, 1), float64)
         seen = cuda.local.array((1, ENTRIES), float32)
@@ -274,7 +282,7 @@ def episodes_kernel(
                 if k == 0 or k == restart:
                     own[0] = blank[0]
                 action = decide(own[0], seen[0], constants, period)
-                draw_normals(keys[i], 0, 0, k + 1, NOISE, e.noise, drawn[0, 0])
+                draw_normals(b.keys[i], 0, 0, k + 1, NOISE, e.noise, drawn[0, 0])
                 for c in range(noise.shape[2]):
                     drawn[0, 0, c] = e.noise * noise[i, k + 1, c]
                 on_time, share, _ = on_off(action, period, 1)

@@ -10,17 +10,7 @@ from numba.core import config
 
 from epv_env.actions import ActionError, as_array
 from epv_env.common.extras import how_to_install
-from epv_env.device.kernels import (
-    AFTER,
-    COIL_ENERGY,
-    INSTEAD,
-    KEEP,
-    WITH_EFFECTS,
-    Batch,
-    Results,
-    launch,
-    step_kernel,
-)
+from epv_env.device import kernels
 from epv_env.observation import LAYOUT
 from epv_env.period import rules_of
 from epv_env.result import N_FIGURE
@@ -36,12 +26,6 @@ UNLIMITED = 2**62
 
 LEGACY_STREAM = 1
 """Numba's default stream, as DLPack numbers streams."""
-
-ENDING = {
-    AutoresetMode.DISABLED: KEEP,
-    AutoresetMode.NEXT_STEP: INSTEAD,
-    AutoresetMode.SAME_STEP: AFTER,
-}
 
 
 def check_available() -> None:
@@ -89,7 +73,6 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         limit = UNLIMITED if self.max_episode_steps is None else self.max_episode_steps
         self._limits = cuda.to_device(np.full(num_envs, limit, dtype=np.int64))
         self._rules = cuda.to_device(rules_of(self.settings))
-        self._key = np.uint64(0)
         self._results = on_device(blank_results(num_envs))
         self._asked = cuda.device_array(num_envs)
 
@@ -105,20 +88,19 @@ class _DeviceVectorEnv(_ValveVectorEnv):
             if each is not None:
                 self._rngs[i] = np_random(each)[0]
         self._begin(np.arange(self.task.n), options)
-        starts = Batch.of(self.task)
-        self._key = self._rngs[0].integers(2**64, dtype=np.uint64)
-        self._with_effects = bool(np.any(starts.numbers[WITH_EFFECTS]))
+        starts = kernels.Batch.of(self.task)
+        self._with_effects = bool(np.any(starts.numbers[kernels.WITH_EFFECTS]))
         self._starts = on_device(starts)
-        self._batch = Batch(*(_like(array, self.num_envs) for array in starts))
+        self._batch = kernels.Batch(*(_like(array, self.num_envs) for array in starts))
         self._results.started.copy_to_device(np.zeros(self.num_envs, dtype=np.int64))
         self._results.ended.copy_to_device(np.ones(self.num_envs, dtype=bool))
-        self._launch(self._results.reward, INSTEAD)
+        self._launch(self._results.reward, kernels.INSTEAD)
         self._results.begun.copy_to_device(np.zeros(self.num_envs, dtype=bool))
         return self._results.observation, {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
         r = self._results
-        self._launch(self._taken_in(actions), ENDING[self.autoreset_mode])
+        self._launch(self._taken_in(actions), list(AutoresetMode).index(self.autoreset_mode))
         infos = {"figures": r.figures, "begun": r.begun}
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
             infos |= {"final_obs": r.final_observation, "_final_obs": r.ended}
@@ -127,12 +109,14 @@ class _DeviceVectorEnv(_ValveVectorEnv):
     @property
     def coil_energy(self) -> Any:
         """Electrical energy of each coil so far, an array of the device (n,) [J]."""
-        return self._batch.numbers[COIL_ENERGY]
+        return self._batch.numbers[kernels.COIL_ENERGY]
 
     def _launch(self, actions: Any, ending: int) -> None:
-        kernel = step_kernel(self.action_form.rule, self._with_effects)
-        launch(kernel, self.num_envs, self._batch, self._starts, self._results, self._rules, actions,
-               self.action.slots, self._key, self._limits, self.task.valves.step, ending)  # fmt: skip
+        kernel = kernels.step_kernel(self.action_form.rule, self._with_effects)
+        kernels.launch(
+            kernel, self.num_envs, self._batch, self._starts, self._results, self._rules, actions,
+            self.action.slots, self._limits, self.task.valves.step, ending,
+        )  # fmt: skip
 
     def _taken_in(self, actions: Any) -> Any:
         """Actions as a contiguous array of float64 of the device, (n,). Raises ActionError."""
@@ -145,16 +129,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         column = array if array.ndim == 1 else array[:, 0]
         if isinstance(column, np.ndarray):
             column = cuda.to_device(column.astype(float))
-        launch(copy_actions, self.num_envs, column, self._asked)
+        kernels.launch(kernels.copy_actions, self.num_envs, column, self._asked)
         return self._asked
-
-
-@cuda.jit
-def copy_actions(actions, asked):
-    """Actions (n,) of any real type and stride as float64: the step is compiled for no other."""
-    i = cuda.grid(1)  # type: ignore[call-arg]
-    if i < len(asked):
-        asked[i] = actions[i]
 
 
 def _array_of(actions: Any) -> Any:
@@ -175,20 +151,17 @@ def _like(array: np.ndarray, n: int) -> Any:
 
 
 def on_device(value: Any) -> Any:
-    """NumPy's arrays in tuples of any depth as arrays of the device; numbers stay what they are."""
-    if isinstance(value, np.ndarray):
-        return cuda.to_device(value)
-    if not isinstance(value, tuple):
-        return value
-    parts = map(on_device, value)
-    return type(value)(*parts) if hasattr(value, "_fields") else tuple(parts)
+    """NumPy's arrays in named tuples of any depth as the device's; numbers stay what they are."""
+    if isinstance(value, tuple):
+        return type(value)(*map(on_device, value))
+    return cuda.to_device(value) if isinstance(value, np.ndarray) else value
 
 
-def blank_results(n: int) -> Results:
+def blank_results(n: int) -> kernels.Results:
     """Zeros for n valves, NumPy's arrays."""
     wide = (n, len(LAYOUT))
     numbers, bools = (lambda: np.zeros(n)), (lambda: np.zeros(n, dtype=bool))
-    return Results(
+    return kernels.Results(
         observation=np.zeros(wide, np.float32), final_observation=np.zeros(wide, np.float32),
         reward=numbers(), terminated=bools(), truncated=bools(), ended=bools(), begun=bools(),
         started=np.zeros(n, np.int64), figures=np.zeros((N_FIGURE, n)),

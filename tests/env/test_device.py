@@ -20,9 +20,9 @@ import pytest
 
 import epv_env  # noqa: F401 - registers the ids
 from epv_env.actions import OnOff
-from epv_env.device.kernels import INSTEAD, Batch, step_kernel
+from epv_env.device.kernels import INSTEAD, Batch, copy_actions, step_kernel
 from epv_env.device.random import draw_normals, philox
-from epv_env.device.vector_env import blank_results, copy_actions
+from epv_env.device.vector_env import blank_results
 from epv_env.period import rules_of
 from epv_env.plant.lanes import N_STATE
 from epv_env.signals import OptionError
@@ -151,8 +151,8 @@ def test_random_numbers_are_those_of_the_published_generator():
 def test_the_kernels_compile_for_an_accelerator(with_effects, monkeypatch):
     task = made("ordinary", "cpu").task
     b, r = Batch.of(task), blank_results(task.n)
-    key, actions, limits = np.uint64(1), np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
-    arguments = (b, b, r, rules_of(task.settings), actions, 1, key, limits, 2e-4, INSTEAD)
+    actions, limits = np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
+    arguments = (b, b, r, rules_of(task.settings), actions, 1, limits, 2e-4, INSTEAD)
     assert compiles(step_kernel(OnOff.rule, with_effects), arguments, monkeypatch)
     for kind in (np.int64, np.float32, np.bool_):
         strided = np.zeros((task.n, 2), dtype=kind)[:, 0]

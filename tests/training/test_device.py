@@ -15,11 +15,12 @@ from controllers.hysteresis import Hysteresis
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.examples.relay import Relay
-from epv_env.device.kernels import P2, episodes_kernel
+from epv_env.device.kernels import P2, Batch, episodes_kernel
+from epv_env.period import rules_of
 from tests.env.test_device import compiles, simulated
-from training.evaluation.batches import Batch, _run, in_batches
+from training.evaluation import batches
 from training.evaluation.metrics import METER, count, count_all
-from training.evaluation.on_device import Begun, run_begun
+from training.evaluation.on_device import NOTHING, run_begun
 from training.evaluation.rollout import begin_episodes, make_env
 from training.rare.episodes import Episodes
 
@@ -28,7 +29,7 @@ pytestmark = pytest.mark.training
 N, PERIODS, RESTART = 3, 40, 20
 SEEDS = [3, 4, 5]
 OPTIONS: dict[str, Any] = {
-    "sensor_noise": 0.0, "settling_time": 0.05, "scenario": "emergency", "drop_bar": (0.2, 0.6),
+    "settling_time": 0.05, "scenario": "emergency", "drop_bar": (0.2, 0.6),
     "conditions": {"worn": 0.5, "delayed": 0.5}, "threads": 1,
 }  # fmt: skip
 WITHIN = 1e-4  # Pa, that is 1e-6 mbar
@@ -40,9 +41,9 @@ def controllers() -> dict[str, Any]:
     return {"PPO": load_policy(), **{name: tuned(name) for name in names}}
 
 
-def on_cpu(controller: Controller, options: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
+def on_cpu(controller: Controller) -> tuple[np.ndarray, np.ndarray]:
     """Decisions and p2 (PERIODS, 2, N), and what is counted, of episodes whose control unit restarts."""
-    env: Any = make_env(controller, N, **options)
+    env: Any = make_env(controller, N, **OPTIONS)
     seen, settings = begin_episodes(env, controller, SEEDS), env.settings
     record, meters = np.empty((PERIODS, 2, N)), np.zeros(N, METER)
     for k in range(PERIODS):
@@ -57,25 +58,27 @@ def on_cpu(controller: Controller, options: dict[str, Any]) -> tuple[np.ndarray,
     return record, meters
 
 
-def begun(controller: Controller, options: dict[str, Any]) -> Begun:
-    env = make_env(controller, N, **options)
+def begun(controller: Controller) -> dict[str, Any]:
+    """Arguments of `run_begun`; the noise is that of the processor."""
+    env: Any = make_env(controller, N, **OPTIONS)
     begin_episodes(env, controller, SEEDS)
-    return Begun.of(env.task)
+    return {
+        "controller": controller, "begun": Batch.of(env.task), "settings": env.settings,
+        "noise": env.task._noise.copy(),
+    }  # fmt: skip
 
 
 def test_every_controller_decides_on_a_simulated_device_as_on_the_cpu(tmp_path):
     """Two lanes for three episodes: one takes a second episode from the queue."""
     works = [
-        {
-            "controller": each, "begun": begun(each, OPTIONS), "periods": PERIODS, "restart": RESTART,
-            "record": np.zeros((PERIODS, 2, N)), "lanes": 2,
-        }
+        begun(each)
+        | {"periods": PERIODS, "restart": RESTART, "record": np.zeros((PERIODS, 2, N)), "lanes": 2}
         for each in controllers().values()
-    ]  # fmt: skip
+    ]
     for each, (counted, work) in zip(
         controllers().values(), simulated(tmp_path, run_begun, works), strict=True
     ):
-        record, meters = on_cpu(each, OPTIONS)
+        record, meters = on_cpu(each)
         np.testing.assert_array_equal(work["record"][:, 0], record[:, 0], err_msg=each.name)
         np.testing.assert_allclose(work["record"][:, 1], record[:, 1], rtol=0, atol=WITHIN)
         for name in METER.names or ():
@@ -84,20 +87,21 @@ def test_every_controller_decides_on_a_simulated_device_as_on_the_cpu(tmp_path):
 
 
 def test_an_episode_does_not_depend_on_the_number_of_lanes(tmp_path):
-    """With noise, which a device draws from each episode's own key."""
-    each = Hysteresis(open_below=0.0, shut_above=0.0)
-    work = {"controller": each, "begun": begun(each, OPTIONS | {"sensor_noise": 1.0}), "periods": 6}
-    (one, _), (three, _) = simulated(tmp_path, run_begun, [work | {"lanes": lanes} for lanes in (1, 3)])
+    """With its own noise, which follows from each episode's key."""
+    work = begun(Hysteresis(open_below=0.0, shut_above=0.0)) | {"noise": NOTHING, "periods": 6}
+    works = [work | {"lanes": lanes, "record": np.zeros((6, 2, N))} for lanes in (1, 3)]
+    (one, a), (three, b) = simulated(tmp_path, run_begun, works)
     np.testing.assert_array_equal(one, three)
+    np.testing.assert_array_equal(a["record"], b["record"])
 
 
 @pytest.mark.parametrize("name", ["PPO", "extrapolating hysteresis"])
 def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
     controller = controllers()[name]
-    b, keys, rules = begun(controller, OPTIONS)
+    work = begun(controller)
     arguments = (
-        b, keys, rules, controller.constants, np.zeros(1, controller.record), np.empty((0, 0, 0)),
-        PERIODS, RESTART, 2e-4, np.zeros(1, np.int64), np.zeros(N, METER), np.empty((0, 2, 0)),
+        work["begun"], rules_of(work["settings"]), controller.constants, np.zeros(1, controller.record),
+        NOTHING, PERIODS, RESTART, 2e-4, np.zeros(1, np.int64), np.zeros(N, METER), NOTHING,
     )  # fmt: skip
     kernel = episodes_kernel(type(controller).decide, controller.record, count, True)
     assert compiles(kernel, arguments, monkeypatch)
@@ -107,7 +111,7 @@ def test_a_rare_episode_is_the_same_on_a_device(monkeypatch):
     """Its noise, too, follows from its numbers: what the device would get is run on the processor."""
     given: dict[str, Any] = {}
 
-    def stub(controller, begun, *, periods, noise):
+    def stub(controller, begun, settings, *, periods, noise):
         given.update(begun=begun, periods=periods, noise=noise)
         return np.zeros(2, METER)
 
@@ -118,14 +122,14 @@ def test_a_rare_episode_is_the_same_on_a_device(monkeypatch):
     task = make_env(episodes.controller, 2).task
     task.begin_from(np.arange(2), episodes.starts(normals))
     np.testing.assert_array_equal(given["noise"][:, : task._noise.shape[1]], task._noise)
-    np.testing.assert_array_equal(given["begun"].batch.numbers[P2], task.valves.state.p2)
+    np.testing.assert_array_equal(given["begun"].numbers[P2], task.valves.state.p2)
     assert given["periods"] == 120 < given["noise"].shape[1]
 
 
-def batch(device: str) -> Batch:
+def part(device: str) -> batches.Batch:
     """Two short episodes without noise, in worn valves."""
-    options = {**OPTIONS, "settling_time": 0.0}
-    return Batch(
+    options = {**OPTIONS, "settling_time": 0.0, "sensor_noise": 0.0}
+    return batches.Batch(
         name="", controller="", first_seed=3, episodes=2, duration=0.06, options=options, device=device
     )
 
@@ -133,13 +137,13 @@ def batch(device: str) -> Batch:
 def test_a_batch_on_a_simulated_device_gives_the_figures_of_the_cpu(tmp_path):
     """Of a controller in the kernel, and of one that decides on the host."""
     both = (tuned("hysteresis"), Relay())
-    works = [{"batch": batch("cuda"), "controller": each} for each in both]
-    for each, ((_, figures), _) in zip(both, simulated(tmp_path, _run, works), strict=True):
-        for name, expected in _run(batch("cpu"), each)[1].items():
+    works = [{"batch": part("cuda"), "controller": each} for each in both]
+    for each, ((_, figures), _) in zip(both, simulated(tmp_path, batches._run, works), strict=True):
+        for name, expected in batches._run(part("cpu"), each)[1].items():
             np.testing.assert_allclose(figures[name], expected, atol=1e-6, err_msg=name)
 
 
 def test_batches_of_a_device_are_larger_and_have_names_of_their_own():
-    parts, others = (in_batches(replace(batch(d), episodes=300_000)) for d in ("cuda", "cpu"))
+    parts, others = (batches.in_batches(replace(part(d), episodes=300_000)) for d in ("cuda", "cpu"))
     assert len(parts) == 2 < len(others)
     assert not {part.name for part in parts} & {part.name for part in others}

@@ -124,9 +124,10 @@ class Episodes:
         from training.evaluation import on_device  # compiles for an accelerator: of no use elsewhere
 
         noise = normals[:, PLANT + DISTURBANCE :].reshape(len(normals), -1, len(MEASURED))
-        periods = round(self.duration / task.period)
-        begun = on_device.Begun.of(task, np.zeros(task.n, np.uint64))
-        m = on_device.run_begun(self.controller, begun, periods=periods, noise=noise)
+        m = on_device.run_begun(
+            self.controller, on_device.Batch.of(task), task.settings,
+            periods=round(self.duration / task.period), noise=noise,
+        )  # fmt: skip
         return np.where(m["failed"] > 0, np.inf, m["excursion"])
 
     def described(self, normals: NDArray) -> list[dict[str, Any]]:
