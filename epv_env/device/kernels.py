@@ -22,6 +22,7 @@ from epv_env.plant.equations import State
 from epv_env.plant.integrate import MAX_STEPS, NONE, STEPS, VALVE, WAITING, go_on
 from epv_env.plant.lanes import EVENT, N_COEFFICIENT, N_EFFECT, N_INPUT, N_ROW, N_STATE, REMAINING
 from epv_env.plant.primitives import exact
+from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.plant.stepping import locate_event, try_step
 from epv_env.plant.valves import U_ROW, acting
 from epv_env.result import FAILED, N_FIGURE, REWARD
@@ -46,8 +47,6 @@ WITH_EFFECTS = EFFECTS + N_EFFECT
 DELAY, ACTING_U, DELAY_LEFT = range(WITH_EFFECTS + 1, WITH_EFFECTS + 4)
 P2, COIL_ENERGY = (State._fields.index(name) for name in ("p2", "coil_energy"))
 """Rows of the table, the state being the first ones."""
-
-
 ENTRIES = len(LAYOUT)
 """Of an observation."""
 
@@ -73,11 +72,10 @@ class Batch(NamedTuple):
             raise OptionError(
                 "a device follows no recordings and moving targets: leave them out, or use the CPU"
             )
-        memory, n = task.memory, task.n
-        rows = [np.atleast_2d(memory[name])[:, :n] for name in NUMBERS]
-        numbers = np.concatenate(rows, dtype=float)
-        keys = memory["noise"][:, 1, 0].copy().view(np.uint64)  # all zero where there is no noise
-        return cls(memory["episodes"], memory["progress"], memory["sensors"][:n], numbers, keys)
+        m, n = task.memory, task.n
+        numbers = np.concatenate([np.atleast_2d(m[name])[:, :n] for name in NUMBERS], dtype=float)
+        keys = m["noise"][:, 1, 0].copy().view(np.uint64)  # all zero where there is no noise
+        return cls(m["episodes"], m["progress"], m["sensors"][:n], numbers, keys)
 
 
 class Results(NamedTuple):
@@ -151,7 +149,7 @@ def delayed_parts(inputs, duration, numbers):
 
 
 @exact
-def integrate(numbers, inputs, duration, lowest, highest, work, queue, longest, extended):
+def integrate(numbers, inputs, duration, lowest, highest, work, queue, extended):
     """Advance a valve through the parts of its period."""
     state, effects = numbers[:N_STATE], numbers[EFFECTS:WITH_EFFECTS]
     queue[VALVE, 0], queue[WAITING, 0], queue[WAITING, 1], queue[STEPS, 0] = NONE, 0, 1, 0
@@ -165,7 +163,7 @@ def integrate(numbers, inputs, duration, lowest, highest, work, queue, longest, 
         if queue[VALVE, 0] == NONE:
             break
         queue[STEPS, 0] += 1
-        try_step(work, longest, extended)
+        try_step(work, DEFAULT_STEP, extended)
 
 
 @cache
@@ -176,7 +174,7 @@ def one_period(with_effects: bool) -> Any:
     """
 
     @exact
-    def take(v, rules, on_time, action, noise, longest, figures, observation):
+    def take(v, rules, on_time, action, noise, figures, observation):
         before, state = cuda.local.array((N_STATE, 1), float64), v.numbers[:N_STATE]
         inputs, duration = cuda.local.array((4, N_INPUT, 1), float64), cuda.local.array((4, 1), float64)
         lowest, highest = cuda.local.array(1, float64), cuda.local.array(1, float64)
@@ -191,9 +189,9 @@ def one_period(with_effects: bool) -> Any:
         parts = delayed_parts(inputs, duration, v.numbers)
         inputs, duration = inputs[:parts], duration[:parts]
         if with_effects and v.numbers[WITH_EFFECTS, 0] != 0.0:
-            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, longest, True)
+            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, True)
         else:
-            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, longest, False)
+            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, False)
         end_period(v.episodes, rules, noise, state, before, lowest, highest, v.sensors, figures,
                    observation, 0, 1)  # fmt: skip
 
@@ -224,7 +222,7 @@ def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
     take = one_period(with_effects)
 
     @cuda.jit
-    def step(b, starts, r, rules, actions, slots, limits, longest, ending):
+    def step(b, starts, r, rules, actions, slots, limits, ending):
         i = cuda.grid(1)  # type: ignore[call-arg]
         if i >= len(b.episodes):
             return
@@ -239,8 +237,8 @@ def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
         e, noise = b.episodes[i], cuda.local.array((1, 1, 4), float64)
         draw_normals(b.keys[i], i, r.started[i], e.steps + 1, NOISE, e.noise, noise[0, 0])
         on_time, action, valid = rule(float(actions[i]), rules[0].control_period, slots)
-        take(alone(b, i), rules, on_time, action, noise, longest, r.figures[:, i : i + 1],
-             r.observation[i : i + 1])  # fmt: skip
+        figures, observation = r.figures[:, i : i + 1], r.observation[i : i + 1]
+        take(alone(b, i), rules, on_time, action, noise, figures, observation)
         r.reward[i] = r.figures[REWARD, i] if valid else math.nan
         r.terminated[i], r.truncated[i] = r.figures[FAILED, i] != 0.0, e.steps >= limits[i]
         r.ended[i] = r.terminated[i] or r.truncated[i]
@@ -267,7 +265,7 @@ def episodes_kernel(
     take = one_period(with_effects)
 
     @cuda.jit
-    def run(b, rules, constants, blank, noise, periods, restart, longest, queue, meters, record):
+    def run(b, rules, constants, blank, noise, periods, restart, queue, meters, record):
         own, drawn = cuda.local.array(1, memory), cuda.local.array((1, 1, 4), float64)
         figures = cuda.local.array((N_FIGURE, 1), float64)
         seen = cuda.local.array((1, ENTRIES), float32)
@@ -286,7 +284,7 @@ def episodes_kernel(
                 for c in range(noise.shape[2]):
                     drawn[0, 0, c] = e.noise * noise[i, k + 1, c]
                 on_time, share, _ = on_off(action, period, 1)
-                take(v, rules, on_time, share, drawn, longest, figures, seen)
+                take(v, rules, on_time, share, drawn, figures, seen)
                 count(m, figures, 0, v.numbers[COIL_ENERGY, 0], period, settling_time)
                 if len(record) > 0:
                     record[k, 0, i], record[k, 1, i] = action, v.numbers[P2, 0]

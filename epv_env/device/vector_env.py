@@ -1,6 +1,6 @@
 """EPValve-v0 and EPValvePWM-v0 as vector environments whose arrays stay on an NVIDIA accelerator."""
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
@@ -11,7 +11,6 @@ from numba.core import config
 from epv_env.actions import ActionError, as_array
 from epv_env.common.extras import how_to_install
 from epv_env.device import kernels
-from epv_env.observation import LAYOUT
 from epv_env.period import rules_of
 from epv_env.result import N_FIGURE
 from epv_env.settings import checked_options
@@ -20,9 +19,6 @@ from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv, _ValveVect
 
 SIMULATED = bool(getattr(config, "ENABLE_CUDASIM", False))
 """Whether numba's simulator stands for the device: its arrays are the host's."""
-
-UNLIMITED = 2**62
-"""Steps of an episode that nothing truncates."""
 
 LEGACY_STREAM = 1
 """Numba's default stream, as DLPack numbers streams."""
@@ -40,15 +36,13 @@ def check_available() -> None:
 class _DeviceVectorEnv(_ValveVectorEnv):
     """n valves on an accelerator; each step overwrites the arrays that the step before gave.
 
-    By the functions of the CPU's environment, on the device's default stream.
-
     Actions may be arrays of the device (anything with `__cuda_array_interface__`, such as torch's
     tensors) or of the host, of any real type; what computes them on another stream is waited for.
-    Observations (n, entries), rewards, terminated and truncated (n,) are arrays of the device. torch
-    reads them without a copy: `torch.as_tensor(observation, device="cuda")`; clone what shall outlast
-    the step. Infos are "figures", (N_FIGURE, n), whose rows epv_env/result.py names, and "begun" (n,):
-    an episode began instead of the step. SAME_STEP adds "final_obs" (n, entries), valid where an episode
-    ended ("_final_obs").
+    Observations (n, entries), rewards, terminated and truncated (n,) are arrays of the device, computed
+    on its default stream. torch reads them without a copy: `torch.as_tensor(x, device="cuda")`; clone
+    what shall outlast the step. Infos are "figures", (N_FIGURE, n), whose rows epv_env/result.py names,
+    and "begun" (n,): an episode began instead of the step. SAME_STEP adds "final_obs" (n, entries),
+    valid where an episode ended ("_final_obs").
 
     In reset the host draws the starts of episodes: those of the CPU's sub-environments with the same
     seeds. Valve i begins with start i, modulo their number; later episodes begin with any of them, drawn
@@ -61,7 +55,7 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         starts: number of different starts, at most num_envs.
     """
 
-    most_envs = 100_000_000
+    most_envs = 10_000_000
 
     def __init__(self, num_envs: int = 1, *, starts: int = 4096, **arguments: Any):
         check_available()
@@ -70,10 +64,9 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         super().__init__(num_envs, **arguments)
         if self.privileged:
             raise OptionError("on a device, privileged is False: its truths stay there")
-        limit = UNLIMITED if self.max_episode_steps is None else self.max_episode_steps
+        limit = 2**62 if self.max_episode_steps is None else self.max_episode_steps
         self._limits = cuda.to_device(np.full(num_envs, limit, dtype=np.int64))
         self._rules = cuda.to_device(rules_of(self.settings))
-        self._results = on_device(blank_results(num_envs))
         self._asked = cuda.device_array(num_envs)
 
     def _on_host(self, num_envs: int) -> int:
@@ -91,11 +84,11 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         starts = kernels.Batch.of(self.task)
         self._with_effects = bool(np.any(starts.numbers[kernels.WITH_EFFECTS]))
         self._starts = on_device(starts)
-        self._batch = kernels.Batch(*(_like(array, self.num_envs) for array in starts))
-        self._results.started.copy_to_device(np.zeros(self.num_envs, dtype=np.int64))
-        self._results.ended.copy_to_device(np.ones(self.num_envs, dtype=bool))
+        shapes = [(*each.shape[:-1], self.num_envs) for each in starts]
+        blanks = map(cuda.device_array, shapes, [each.dtype for each in starts])
+        self._batch = kernels.Batch(*blanks)
+        self._results = on_device(blank_results(self.num_envs))
         self._launch(self._results.reward, kernels.INSTEAD)
-        self._results.begun.copy_to_device(np.zeros(self.num_envs, dtype=bool))
         return self._results.observation, {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
@@ -115,7 +108,7 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         kernel = kernels.step_kernel(self.action_form.rule, self._with_effects)
         kernels.launch(
             kernel, self.num_envs, self._batch, self._starts, self._results, self._rules, actions,
-            self.action.slots, self._limits, self.task.valves.step, ending,
+            self.action.slots, self._limits, ending,
         )  # fmt: skip
 
     def _taken_in(self, actions: Any) -> Any:
@@ -144,12 +137,6 @@ def _array_of(actions: Any) -> Any:
     return cuda.as_cuda_array(actions)
 
 
-def _like(array: np.ndarray, n: int) -> Any:
-    """An array of the device for n valves; valves are the last axis."""
-    shape, kind = (*array.shape[:-1], n), cast(Any, array.dtype)
-    return cuda.device_array(shape, dtype=kind)
-
-
 def on_device(value: Any) -> Any:
     """NumPy's arrays in named tuples of any depth as the device's; numbers stay what they are."""
     if isinstance(value, tuple):
@@ -158,12 +145,12 @@ def on_device(value: Any) -> Any:
 
 
 def blank_results(n: int) -> kernels.Results:
-    """Zeros for n valves, NumPy's arrays."""
-    wide = (n, len(LAYOUT))
+    """Of n valves whose episodes are to begin: NumPy's arrays, zeros."""
+    wide = (n, kernels.ENTRIES)
     numbers, bools = (lambda: np.zeros(n)), (lambda: np.zeros(n, dtype=bool))
     return kernels.Results(
         observation=np.zeros(wide, np.float32), final_observation=np.zeros(wide, np.float32),
-        reward=numbers(), terminated=bools(), truncated=bools(), ended=bools(), begun=bools(),
+        reward=numbers(), terminated=bools(), truncated=bools(), ended=~bools(), begun=bools(),
         started=np.zeros(n, np.int64), figures=np.zeros((N_FIGURE, n)),
     )  # fmt: skip
 

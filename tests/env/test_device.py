@@ -152,7 +152,7 @@ def test_the_kernels_compile_for_an_accelerator(with_effects, monkeypatch):
     task = made("ordinary", "cpu").task
     b, r = Batch.of(task), blank_results(task.n)
     actions, limits = np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
-    arguments = (b, b, r, rules_of(task.settings), actions, 1, limits, 2e-4, INSTEAD)
+    arguments = (b, b, r, rules_of(task.settings), actions, 1, limits, INSTEAD)
     assert compiles(step_kernel(OnOff.rule, with_effects), arguments, monkeypatch)
     for kind in (np.int64, np.float32, np.bool_):
         strided = np.zeros((task.n, 2), dtype=kind)[:, 0]

@@ -101,7 +101,7 @@ def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
     work = begun(controller)
     arguments = (
         work["begun"], rules_of(work["settings"]), controller.constants, np.zeros(1, controller.record),
-        NOTHING, PERIODS, RESTART, 2e-4, np.zeros(1, np.int64), np.zeros(N, METER), NOTHING,
+        NOTHING, PERIODS, RESTART, np.zeros(1, np.int64), np.zeros(N, METER), NOTHING,
     )  # fmt: skip
     kernel = episodes_kernel(type(controller).decide, controller.record, count, True)
     assert compiles(kernel, arguments, monkeypatch)

@@ -15,7 +15,6 @@ from controllers.base import Controller, OneValve, Privileged
 from epv_env.device.kernels import WITH_EFFECTS, Batch, episodes_kernel, launch
 from epv_env.device.vector_env import on_device
 from epv_env.period import rules_of
-from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.settings import Settings
 from epv_env.signals import OptionError
 from training.evaluation.metrics import METER, EpisodeMetrics, count
@@ -25,10 +24,8 @@ LANES = 262_144
 """Most threads of a launch: more than an accelerator of today runs at a time."""
 DRAWN_AT_ONCE = 4096
 """Starts that a process draws: half a second's work."""
-NEVER = -1
-"""Instead of the period before which the control unit restarts."""
-NOTHING = np.empty((0, 0, 0))
-"""No noise, or nothing to fill."""
+NEVER, NOTHING = -1, np.empty((0, 0, 0))
+"""Instead of a period before which the control unit restarts, and of arrays."""
 
 
 def takes(controller: Controller) -> bool:
@@ -68,7 +65,7 @@ def run_begun(
     meters, kept = cuda.to_device(np.zeros(len(begun.keys), METER)), cuda.to_device(record)
     launch(kernel, min(lanes, len(begun.keys)), on_device(begun), cuda.to_device(rules_of(settings)),
            on_device(controller.constants), cuda.to_device(np.zeros(1, controller.record)),
-           cuda.to_device(noise), periods, restart, DEFAULT_STEP, cuda.to_device(np.zeros(1, np.int64)),
+           cuda.to_device(noise), periods, restart, cuda.to_device(np.zeros(1, np.int64)),
            meters, kept)  # fmt: skip
     kept.copy_to_host(record)
     return meters.copy_to_host()
