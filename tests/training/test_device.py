@@ -10,18 +10,17 @@ import numpy as np
 import pytest
 
 pytest.importorskip("joblib")
-from controllers.base import Controller
 from controllers.hysteresis import Hysteresis
-from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.examples.relay import Relay
-from epv_env.device.kernels import P2, Batch, episodes_kernel
+from docs.studies.device.study import controllers, on_cpu
+from epv_env.device.kernels import P2, episodes_kernel
 from epv_env.period import rules_of
 from tests.env.test_device import compiles, simulated
 from training.evaluation import batches
-from training.evaluation.metrics import METER, count, count_all
+from training.evaluation.metrics import METER, count
 from training.evaluation.on_device import NOTHING, run_begun
-from training.evaluation.rollout import begin_episodes, make_env
+from training.evaluation.rollout import make_env
 from training.rare.episodes import Episodes
 
 pytestmark = pytest.mark.training
@@ -35,51 +34,17 @@ OPTIONS: dict[str, Any] = {
 WITHIN = 1e-4  # Pa, that is 1e-6 mbar
 
 
-def controllers() -> dict[str, Any]:
-    """Of the comparison, those that decide in a compiled function."""
-    names = ("hysteresis", "extrapolating hysteresis", "adaptive pulse")
-    return {"PPO": load_policy(), **{name: tuned(name) for name in names}}
-
-
-def on_cpu(controller: Controller) -> tuple[np.ndarray, np.ndarray]:
-    """Decisions and p2 (PERIODS, 2, N), and what is counted, of episodes whose control unit restarts."""
-    env: Any = make_env(controller, N, **OPTIONS)
-    seen, settings = begin_episodes(env, controller, SEEDS), env.settings
-    record, meters = np.empty((PERIODS, 2, N)), np.zeros(N, METER)
-    for k in range(PERIODS):
-        if k == RESTART:
-            controller.reset(N)
-        record[k, 0] = controller.act(seen)
-        result = env.advance(record[k, 0])
-        seen, record[k, 1] = result.observation, env.task.valves.state.p2
-        count_all(
-            meters, result.figures, env.coil_energy, settings.control_period, settings.settling_time
-        )
-    return record, meters
-
-
-def begun(controller: Controller) -> dict[str, Any]:
-    """Arguments of `run_begun`; the noise is that of the processor."""
-    env: Any = make_env(controller, N, **OPTIONS)
-    begin_episodes(env, controller, SEEDS)
-    return {
-        "controller": controller, "begun": Batch.of(env.task), "settings": env.settings,
-        "noise": env.task._noise.copy(),
-    }  # fmt: skip
-
-
 def test_every_controller_decides_on_a_simulated_device_as_on_the_cpu(tmp_path):
     """Two lanes for three episodes: one takes a second episode from the queue."""
-    works = [
-        begun(each)
-        | {"periods": PERIODS, "restart": RESTART, "record": np.zeros((PERIODS, 2, N)), "lanes": 2}
-        for each in controllers().values()
-    ]
-    for each, (counted, work) in zip(
-        controllers().values(), simulated(tmp_path, run_begun, works), strict=True
-    ):
-        record, meters = on_cpu(each)
-        np.testing.assert_array_equal(work["record"][:, 0], record[:, 0], err_msg=each.name)
+    names, cases = (
+        list(controllers()),
+        [on_cpu(each, SEEDS, PERIODS, RESTART, **OPTIONS) for each in controllers().values()],
+    )
+    settings = {"periods": PERIODS, "restart": RESTART, "lanes": 2}
+    works = [each | settings | {"record": np.zeros((PERIODS, 2, N))} for _, _, each in cases]
+    found = simulated(tmp_path, run_begun, works)
+    for case, (record, meters, _), (counted, work) in zip(names, cases, found, strict=True):
+        np.testing.assert_array_equal(work["record"][:, 0], record[:, 0], err_msg=case)
         np.testing.assert_allclose(work["record"][:, 1], record[:, 1], rtol=0, atol=WITHIN)
         for name in METER.names or ():
             np.testing.assert_allclose(counted[name], meters[name], atol=1e-6, err_msg=name)
@@ -88,7 +53,8 @@ def test_every_controller_decides_on_a_simulated_device_as_on_the_cpu(tmp_path):
 
 def test_an_episode_does_not_depend_on_the_number_of_lanes(tmp_path):
     """With its own noise, which follows from each episode's key."""
-    work = begun(Hysteresis(open_below=0.0, shut_above=0.0)) | {"noise": NOTHING, "periods": 6}
+    _, _, work = on_cpu(Hysteresis(open_below=0.0, shut_above=0.0), SEEDS, 0, **OPTIONS)
+    work |= {"noise": NOTHING, "periods": 6}
     works = [work | {"lanes": lanes, "record": np.zeros((6, 2, N))} for lanes in (1, 3)]
     (one, a), (three, b) = simulated(tmp_path, run_begun, works)
     np.testing.assert_array_equal(one, three)
@@ -98,7 +64,7 @@ def test_an_episode_does_not_depend_on_the_number_of_lanes(tmp_path):
 @pytest.mark.parametrize("name", ["PPO", "extrapolating hysteresis"])
 def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
     controller = controllers()[name]
-    work = begun(controller)
+    _, _, work = on_cpu(controller, SEEDS, 0, **OPTIONS)
     arguments = (
         work["begun"], rules_of(work["settings"]), controller.constants, np.zeros(1, controller.record),
         NOTHING, PERIODS, RESTART, np.zeros(1, np.int64), np.zeros(N, METER), NOTHING,
@@ -108,7 +74,7 @@ def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
 
 
 def test_a_rare_episode_is_the_same_on_a_device(monkeypatch):
-    """Its noise, too, follows from its numbers: what the device would get is run on the processor."""
+    """The device gets its start and its noise, which follow from its numbers."""
     given: dict[str, Any] = {}
 
     def stub(controller, begun, settings, *, periods, noise):
