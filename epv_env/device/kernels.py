@@ -10,8 +10,9 @@ from collections.abc import Callable
 from functools import cache
 from typing import Any, NamedTuple
 
+import numba.cuda
 import numpy as np
-from numba import cuda, float32, float64, int64
+from numba import float32, float64, int64
 from numba.core.errors import NumbaPerformanceWarning
 
 from epv_env.actions import on_off
@@ -28,6 +29,8 @@ from epv_env.plant.valves import U_ROW, acting
 from epv_env.result import FAILED, N_FIGURE, REWARD
 from epv_env.signals import OptionError
 from epv_env.task import LimitingTask
+
+cuda: Any = numba.cuda  # to a type checker its functions are classes
 
 THREADS = 128
 """Threads of a block."""
@@ -113,7 +116,7 @@ def launch(kernel: Any, n: int, *arguments: Any) -> None:
 @cuda.jit
 def copy_actions(actions, asked):
     """Actions (n,) of any real type and stride as float64: the step is compiled for no other."""
-    i = cuda.grid(1)  # type: ignore[call-arg]
+    i = cuda.grid(1)
     if i < len(asked):
         asked[i] = actions[i]
 
@@ -223,7 +226,7 @@ def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
 
     @cuda.jit
     def step(b, starts, r, rules, actions, slots, limits, ending):
-        i = cuda.grid(1)  # type: ignore[call-arg]
+        i = cuda.grid(1)
         if i >= len(b.episodes):
             return
         r.begun[i] = ending == INSTEAD and r.ended[i]
@@ -271,7 +274,7 @@ def episodes_kernel(
         seen = cuda.local.array((1, ENTRIES), float32)
         period, settling_time = rules[0].control_period, rules[0].settling_time
         while True:
-            i = cuda.atomic.add(queue, 0, 1)  # type: ignore[attr-defined]
+            i = cuda.atomic.add(queue, 0, 1)
             if i >= len(meters):
                 break
             v, e, m = alone(b, i), b.episodes[i], meters[i]

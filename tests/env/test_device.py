@@ -19,10 +19,10 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers the ids
-from epv_env.actions import OnOff
+from epv_env.actions import ActionError, OnOff
 from epv_env.device.kernels import INSTEAD, Batch, copy_actions, step_kernel
 from epv_env.device.random import draw_normals, philox
-from epv_env.device.vector_env import blank_results
+from epv_env.device.vector_env import EPValveDeviceVectorEnv, blank_results
 from epv_env.period import rules_of
 from epv_env.plant.lanes import N_STATE
 from epv_env.signals import OptionError
@@ -75,6 +75,7 @@ def rollout(case: str, device: str) -> dict[str, np.ndarray]:
     for period in range(PERIODS + 1):
         random = rng.random(N) * (period > 3)  # off until the valves open
         actions = random > 0.5 if envs.unwrapped.action_form is OnOff else 2.0 * random[:, None] - 1.0
+        actions = np.repeat(actions, 2, axis=0)[::2]  # not contiguous
         *given, infos = envs.step(actions)
         found.append((state_of(envs)[0, :N], *given, infos["deviation_bar"], infos["_deviation_bar"]))
         if "final_info" in infos:
@@ -168,6 +169,20 @@ def test_a_device_that_is_not_there_is_refused():
         made("ordinary", "cuda")
     with pytest.raises(OptionError, match="'cpu' or 'cuda'"):
         made("ordinary", "tpu")
+
+
+@pytest.mark.parametrize(
+    ("actions", "words"),
+    [
+        (SimpleNamespace(requires_grad=True), r"give actions.detach\(\)"),
+        (np.zeros(2, dtype="V2"), "bfloat16 as float32"),  # as torch shows its bfloat16
+        (np.zeros((2, 2)), "each of 2 valves"),
+        ([[0], [0, 1]], "each of 2 valves"),
+    ],
+)
+def test_actions_that_a_device_cannot_take_are_refused(actions, words):
+    with pytest.raises(ActionError, match=words):
+        EPValveDeviceVectorEnv._taken_in(SimpleNamespace(num_envs=2), actions)  # type: ignore[arg-type]
 
 
 def test_an_option_of_the_device_is_refused_on_the_cpu():

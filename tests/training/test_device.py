@@ -3,6 +3,10 @@
 Without an accelerator numba's simulator stands for it, as in tests/env/test_device.py.
 """
 
+import json
+import os
+import subprocess
+import sys
 from dataclasses import replace
 from typing import Any
 
@@ -61,7 +65,7 @@ def test_an_episode_does_not_depend_on_the_number_of_lanes(tmp_path):
     np.testing.assert_array_equal(a["record"], b["record"])
 
 
-@pytest.mark.parametrize("name", ["PPO", "extrapolating hysteresis"])
+@pytest.mark.parametrize("name", [pytest.param("PPO", marks=pytest.mark.slow), "hysteresis"])
 def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
     controller = controllers()[name]
     _, _, work = on_cpu(controller, SEEDS, 0, **OPTIONS)
@@ -113,3 +117,12 @@ def test_batches_of_a_device_are_larger_and_have_names_of_their_own():
     parts, others = (batches.in_batches(replace(part(d), episodes=300_000)) for d in ("cuda", "cpu"))
     assert len(parts) == 2 < len(others)
     assert not {part.name for part in parts} & {part.name for part in others}
+
+
+@pytest.mark.slow
+def test_the_study_runs_in_the_simulator(tmp_path):
+    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-m", "docs.studies.device.study", "--quick", "--out", tmp_path]
+    subprocess.run(command, env=environment, check=True, timeout=600)
+    rows = json.loads((tmp_path / "figures.json").read_text())["checks"]
+    assert len(rows) == 2 + len(controllers())

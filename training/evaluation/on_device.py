@@ -72,7 +72,7 @@ def run_begun(
 
 
 def run_episodes(
-    controller: OneValve,
+    controller: Any,
     *,
     seeds: Sequence[int],
     duration: float,
@@ -92,7 +92,7 @@ def run_episodes(
     return EpisodeMetrics.of(meters, period)
 
 
-def _begun(controller: OneValve, seeds: Sequence[int], options: dict[str, Any]) -> Batch:
+def _begun(controller: Any, seeds: Sequence[int], options: dict[str, Any]) -> Batch:
     """Episodes that begin with these seeds, as on the processor."""
     env = make_env(controller, len(seeds), **options)
     begin_episodes(env, controller, seeds)
