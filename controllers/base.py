@@ -89,3 +89,8 @@ class OneValve:
 def in_unit(observation, i):
     """Entry i of an observation (entries,) in its unit."""
     return observation[i] * SCALE[i] + CENTRE[i]
+
+
+def decides_on_device(controller: Controller) -> bool:
+    """Whether an accelerator can run the controller's decisions beside the plant."""
+    return isinstance(controller, OneValve) and not isinstance(controller, Privileged)

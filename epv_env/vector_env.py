@@ -19,9 +19,8 @@ from epv_env.task import LimitingTask
 
 BATCH = (
     "num_envs", "max_episode_steps", "autoreset_mode", "threads", "device", "to_host", "starts",
-    "precision",
 )  # fmt: skip
-"""What a batch takes beside the arguments of one environment; the last four: `make_vector`."""
+"""What a batch takes beside the arguments of one environment; the last three: `make_vector`."""
 
 
 def masked_info(result: StepResult, valid: NDArray) -> dict[str, Any]:

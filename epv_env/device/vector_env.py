@@ -99,11 +99,6 @@ class _DeviceVectorEnv(_ValveVectorEnv):
             infos |= {"final_obs": r.final_observation, "_final_obs": r.ended}
         return r.observation, r.reward, r.terminated, r.truncated, infos
 
-    @property
-    def coil_energy(self) -> Any:
-        """Electrical energy of each coil so far, an array of the device (n,) [J]."""
-        return self._batch.numbers[kernels.COIL_ENERGY]
-
     def _launch(self, actions: Any, ending: int) -> None:
         kernel = kernels.step_kernel(self.action_form.rule, self._with_effects)
         kernels.launch(

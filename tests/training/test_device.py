@@ -105,12 +105,15 @@ def part(device: str) -> batches.Batch:
 
 
 def test_a_batch_on_a_simulated_device_gives_the_figures_of_the_cpu(tmp_path):
-    """Of a controller in the kernel, and of one that decides on the host."""
-    both = (tuned("hysteresis"), Relay())
-    works = [{"batch": part("cuda"), "controller": each} for each in both]
-    for each, ((_, figures), _) in zip(both, simulated(tmp_path, batches._run, works), strict=True):
-        for name, expected in batches._run(part("cpu"), each)[1].items():
-            np.testing.assert_allclose(figures[name], expected, atol=1e-6, err_msg=name)
+    work = {"batch": part("cuda"), "controller": tuned("hysteresis")}
+    (((_, figures), _),) = simulated(tmp_path, batches._run, [work])
+    for name, expected in batches._run(part("cpu"), work["controller"])[1].items():
+        np.testing.assert_allclose(figures[name], expected, atol=1e-6, err_msg=name)
+
+
+def test_a_controller_of_the_host_runs_on_the_processor():
+    (asked,), (cpu,) = (batches.run_batches([part(d)], {"": Relay()}, what="") for d in ("cuda", "cpu"))
+    np.testing.assert_array_equal(asked.episode_return, cpu.episode_return)
 
 
 def test_batches_of_a_device_are_larger_and_have_names_of_their_own():

@@ -11,7 +11,7 @@ from joblib import Parallel, delayed
 from numba import cuda
 from numpy.typing import NDArray
 
-from controllers.base import Controller, OneValve, Privileged
+from controllers.base import decides_on_device
 from epv_env.device.kernels import WITH_EFFECTS, Batch, episodes_kernel, launch
 from epv_env.device.vector_env import on_device
 from epv_env.period import rules_of
@@ -28,11 +28,6 @@ NEVER, NOTHING = -1, np.empty((0, 0, 0))
 """Instead of a period before which the control unit restarts, and of arrays."""
 
 
-def takes(controller: Controller) -> bool:
-    """Whether a controller decides on the device."""
-    return isinstance(controller, OneValve) and not isinstance(controller, Privileged)
-
-
 def run_begun(
     controller: Any,
     begun: Batch,
@@ -47,7 +42,7 @@ def run_begun(
     """Run episodes that have begun on the host; returns records of METER (n,).
 
     Args:
-        controller: that `takes` takes.
+        controller: one that `decides_on_device`.
         begun: the episodes.
         settings: of the environment.
         periods: after which an episode ends.
@@ -58,7 +53,7 @@ def run_begun(
 
     Raises OptionError for another controller.
     """
-    if not takes(controller):
+    if not decides_on_device(controller):
         raise OptionError(f'{controller.name} decides on the processor: leave out the device "cuda"')
     with_effects = bool(np.any(begun.numbers[WITH_EFFECTS]))
     kernel = episodes_kernel(type(controller).decide, controller.record, count, with_effects)
