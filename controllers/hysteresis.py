@@ -75,7 +75,7 @@ class Hysteresis(OneValve):
     """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
-    decide_all = _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), _loop(DIGEST)
     record = np.dtype((np.record, [("off", np.float64)]))
 
     def __post_init__(self) -> None:

@@ -69,7 +69,7 @@ def plan(v: Any, table: Any, t: int, p: Any, period: float) -> None:
         v.advised = 0.0 if fed and v.opens_in > 0 and v.margin < 0 else 1.0
         return
     by_gain = p.doubt * v.gain_deviation * v.under_way / v.gain
-    uncertain = np.sqrt((p.caution * v.offset_deviation) ** 2 + by_gain**2)
+    uncertain = math.sqrt((p.caution * v.offset_deviation) ** 2 + by_gain**2)
     asked = (p.aim + v.reserve - uncertain - v.error) / v.gain
     slope = v.fall / (v.gain * v.pace)
     v.remaining = duration(table, t, v.offset, v.p1, v.p2, v.p3, asked, slope) / v.pace
@@ -125,7 +125,7 @@ def _loop(digest: str) -> Any:
 class _Pulse(OneValve):
     """Acts as `plan` advises."""
 
-    decide_all = _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), _loop(DIGEST)
     record = VALVE
 
 
