@@ -9,9 +9,8 @@ from scipy.stats import chi2, t
 
 from identification.calibration.search import weighted_least_squares
 from identification.confidence import covariance as stage
-from identification.confidence.confidence import assess_confidence, limit_ratio
+from identification.confidence.confidence import assess_confidence, confidence_section, limit_ratio
 from identification.confidence.covariance import estimate_covariance
-from identification.confidence.section import confidence_section
 from tests.identification.twins import TRUE, calibration, problem, twin_confidence
 
 SAMPLES, RECORDINGS = 4000, 3

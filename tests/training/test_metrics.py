@@ -5,31 +5,30 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from epv_env.result import CONSUMPTION, DEVIATION, FAILED, N_FIGURE, REWARD, SWITCHINGS, VENTED
 from training.evaluation import seeds
 from training.evaluation.metrics import (
+    METER,
     EpisodeMetrics,
-    Meter,
+    count_all,
     summary,
     tail_excursion,
     violation_interval,
 )
-from training.evaluation.statistics import mean_interval, paired_difference
+from training.evaluation.statistics import MANY, mean_interval, paired_difference
 
 PERIOD = 0.1
 
 
 def run(deviations, settling_time=0.0, failed=None, consumption=None):
-    """The metrics of one episode with these deviations [bar], a switching and 1 mg in each period."""
-    meter = Meter(1, PERIOD, settling_time)
+    """The metrics of one episode with these deviations [bar]; each period: a switching, 1 mg, 2 W."""
+    meters, figures = np.zeros(1, METER), np.zeros((N_FIGURE, 1))
+    figures[[SWITCHINGS, VENTED, REWARD], 0] = 1.0, 1e-6, -1.0
     for k, deviation in enumerate(deviations):
-        info = {
-            "deviation_bar": np.array([deviation]),
-            "switchings": np.array([1]),
-            "vented_g": np.array([1e-3]),
-            "consumption_g_per_s": np.array([0.0 if consumption is None else consumption[k]]),
-        }
-        meter.update(np.array([-1.0]), np.array([failed == k]), info)
-    return meter.result()
+        drawn = 0.0 if consumption is None else 1e-3 * consumption[k]
+        figures[[DEVIATION, CONSUMPTION, FAILED], 0] = deviation, drawn, failed == k
+        count_all(meters, figures, np.array([2.0 * PERIOD * (k + 1)]), PERIOD, settling_time)
+    return EpisodeMetrics.of(meters, PERIOD)
 
 
 def test_figures_of_a_known_episode():
@@ -40,6 +39,7 @@ def test_figures_of_a_known_episode():
     assert m.rms_bar[0] == pytest.approx(np.sqrt((0.01 + 0.09 + 0.16 + 0.04) / 4))
     assert m.switchings_per_s[0] == pytest.approx(1 / PERIOD)
     assert m.vented_g_per_s[0] == pytest.approx(1e-3 / PERIOD)
+    assert m.coil_W[0] == pytest.approx(2.0)
     assert m.episode_return[0] == -4.0
     assert m.stayed[0]
 
@@ -126,6 +126,13 @@ def test_95_percent_intervals_of_a_normal_mean_hold_it_about_as_often():
 def test_the_interval_has_the_width_of_the_normal_theory():
     low, high = mean_interval(np.random.default_rng(0).standard_normal(1200))
     assert high - low == pytest.approx(2 * 1.96 / np.sqrt(1200), rel=0.1)
+
+
+def test_the_interval_of_many_is_that_of_resampling(monkeypatch):
+    values = np.random.default_rng(0).exponential(size=MANY + 1)
+    many = mean_interval(values)
+    monkeypatch.setattr("training.evaluation.statistics.MANY", len(values))
+    assert many == pytest.approx(mean_interval(values), abs=0.05 * np.ptp(many))
 
 
 def test_pairing_takes_away_what_both_met():

@@ -10,7 +10,7 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration import search
 from identification.calibration import search as starts
-from identification.calibration.calibrate import calibrate, calibration_warnings
+from identification.calibration.calibrate import calibrate, calibration_section, calibration_warnings
 from identification.calibration.problem import ParameterVector, calibration_problem
 from identification.calibration.search import (
     METHODS,
@@ -18,7 +18,6 @@ from identification.calibration.search import (
     search_from_all_starts,
     starting_points,
 )
-from identification.calibration.section import calibration_section
 from tests.identification.twins import TRUE, calibration, freed, problem, twin
 
 START = Parameters.initial_guess()

@@ -11,7 +11,7 @@ import pytest
 from identification.block_bootstrap import Interval
 from identification.gap.fit.laws import AS_ASSUMED
 from identification.gap.report.gap_json import as_json, magnitudes, unit_name
-from identification.gap.report.quantities import (
+from identification.gap.report.sentences import (
     gap_with_interval,
     probability_text,
     quantity,

@@ -8,19 +8,25 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from docs.studies.reproduction.errata import SAMPLES as REPORTED
-from docs.studies.reproduction.errata import STATISTICS, TREND_OFFSETS, TREND_SLOPES
 from epv_env.plant.channels import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets, white_noise_band
 from identification.quality.channel import descriptive_statistics, run_limit
-from identification.quality.section import as_json, quality_section
-from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
+from identification.quality.section import (
+    CHECKS,
+    as_json,
+    channel_verdict,
+    check_results,
+    quality_section,
+    worst_status,
+)
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
 from identification.recordings.recording_checks import longest_run
 from identification.report.page import Picture, Table
+from tests.identification.quality.printed import STATISTICS, TREND_OFFSETS, TREND_SLOPES
 from tests.identification.quality.records import AMBIENT, PERIOD, readings, rest_record, with_channel
 
 SAMPLES = 10_000
+"""Of the report's record: 5 s at 2000 Hz."""
 TIME = np.arange(SAMPLES) * PERIOD
 
 
@@ -186,13 +192,13 @@ def test_section_and_json_are_complete(which):
 
 def chance_of_staying_below(factor):
     """That none of n independent normal samples exceeds the factor."""
-    return (1 - 2 * stats.norm.sf(factor)) ** REPORTED
+    return (1 - 2 * stats.norm.sf(factor)) ** SAMPLES
 
 
 def test_trends_are_insignificant_and_offsets_small():
     for name in CHANNELS:
         sensor, sigma = SENSORS[name], STATISTICS[name].standard_deviation
-        assert abs(TREND_SLOPES[name]) < 1.8 * sigma * np.sqrt(12 / REPORTED) / 5
+        assert abs(TREND_SLOPES[name]) < 1.8 * sigma * np.sqrt(12 / SAMPLES) / 5
         offset = TREND_OFFSETS[name] - name.startswith("p")
         assert abs(offset) < 0.029 * sensor.accuracy * sensor.high
 
@@ -207,5 +213,5 @@ def test_outlier_factors_are_what_chance_makes_them_or_less():
 
 @pytest.mark.parametrize(("name", "errors"), [("I", 8.6), ("U", 5.8), ("p3", 7.4)])
 def test_kurtosis_lies_below_that_of_normal_noise(name, errors):
-    values = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / REPORTED)
+    values = (3 - STATISTICS[name].kurtosis) / np.sqrt(24 / SAMPLES)
     assert values == pytest.approx(errors, abs=0.06)
