@@ -79,7 +79,7 @@ class Policy(OneValve):
     """[s]"""
     name: str = "PPO"
     environment: str = "EPValve-v0"
-    decide_all = _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), _loop(DIGEST)
 
     def __post_init__(self) -> None:
         fallback = tuned(FALLBACK, self.plant)

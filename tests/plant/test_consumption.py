@@ -11,7 +11,6 @@ from epv_env.plant.consumption import (
     Profiles,
     check_scenario,
     draw_profile,
-    totals,
 )
 
 LONGEST_PERIOD = 0.1
@@ -49,14 +48,6 @@ def test_the_air_taken_is_the_area_of_the_trapezoids(period):
     taken = np.sum(flows([one], period, duration)) * period
     area = 4e-3 * (0.03 / 2 + 0.05 + 0.02 / 2)
     assert taken == pytest.approx(1e-4 * duration + 10 * area, rel=1e-11)
-
-
-def test_a_step_is_the_flow_from_its_start_to_its_end():
-    found = flows([profile(start=0.1, hold=0.05, flow=2e-3)], 0.01, 0.3)[:, 0]
-    assert np.all(found[:10] == 0)
-    np.testing.assert_allclose(found[11:15], 2e-3, rtol=1e-12)
-    np.testing.assert_allclose(found[16:], 0, atol=1e-15)
-    assert np.sum(found) * 0.01 == pytest.approx(2e-3 * 0.05)
 
 
 @pytest.mark.parametrize("name", ["service", "pumping", "creeping"])
@@ -112,14 +103,3 @@ def test_episodes_are_read_independently():
 def test_an_unknown_name_is_refused():
     with pytest.raises(ValueError, match="unknown consumption scenario 'x': choose one of mixed, no"):
         check_scenario("x")
-
-
-@pytest.mark.parametrize("name", ["service", "pumping", "creeping"])
-def test_totals_are_the_sums_of_the_mean_flows(name):
-    profiles, period = Profiles(3), 5e-3
-    for i in range(3):
-        profiles.start(i, SCENARIOS[name].draw(np.random.default_rng(i)))
-    times = np.arange(1201) * period
-    found = totals(profiles.progress, times)
-    flows = [profiles.mean_flow(np.full(3, time), period) for time in times[:-1]]
-    np.testing.assert_allclose(np.diff(found, axis=1).T, np.array(flows) * period, atol=1e-12)

@@ -18,13 +18,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.settings import make_settings
-from training.studies.sweep_designs import (
-    ONE_AT_A_TIME,
-    chosen_points,
-    parameters,
-    regions,
-)
-from training.studies.sweep_report import harmful_changes, share_figure
+from training.studies.sweep import ONE_AT_A_TIME, harmful_changes, parameters
 
 pytestmark = pytest.mark.training
 
@@ -53,12 +47,6 @@ def test_the_parameters_are_those_of_tables_6_and_7_and_the_environment():
     assert factors == named - set(CATALOGUE["local_gas_speed"])
 
 
-def test_only_named_factors_are_changed_and_regions_stay():
-    points = chosen_points(PLANT, ["regions", "parameters"], ["R"])
-    assert {point.factor for point in points} == {"region", "R"}
-    assert len(points) == len(list(regions(PLANT))) + 4
-
-
 def test_a_change_hurts_if_its_interval_lies_above_the_nominal_one():
     common = {"design": "parameters", "controller": "c", "left_high": 1.0}
     points = pd.DataFrame(
@@ -74,10 +62,6 @@ def test_a_change_hurts_if_its_interval_lies_above_the_nominal_one():
         {"controller": "c", "changed": "parameters", "tried": 2, "hurt": 1,
          "most [% leave]": "R +10 % (20)"}
     ]  # fmt: skip
-    labels = [
-        label.get_text() for label in share_figure(points, ["parameters"]).axes[0].get_yticklabels()
-    ]
-    assert labels == ["R: +10 %"]
 
 
 def sweep(out, *arguments):
@@ -114,7 +98,6 @@ def test_two_workers_and_a_killed_sweep_give_the_same_to_the_bit(tmp_path):
     assert len(after) == len(set(after)) == BATCHES  # nor done twice
     for name in ("results.json", "points.csv"):
         assert (out / name).read_bytes() == (tmp_path / "alone" / name).read_bytes()
-    assert (out / "robustness-conditions.png").exists()
 
 
 def test_a_plant_of_other_sensors_is_swept_anew(tmp_path):
@@ -129,17 +112,3 @@ def test_a_plant_of_other_sensors_is_swept_anew(tmp_path):
         assert len(set(finished(tmp_path / "out"))) == len(finished(tmp_path / "out")) == 4
         subjects.append((tmp_path / "out" / "finished.jsonl").read_text().splitlines()[0])
     assert subjects[0] != subjects[1]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--factors", "luck"], "no factor 'luck' in the designs"),
-        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
-        (["--device", "cuda"], "needs an NVIDIA accelerator"),
-    ],
-)
-def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path, capsys):
-    assert sweep(tmp_path / "out", *arguments) == 2
-    assert words in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()

@@ -1,0 +1,155 @@
+"""Parametric sensitivity, one parameter at a time: the study behind the report's Tables 8 and 9.
+
+Every variant of the parameters runs the report's test cases. Its total error (eq. 21) against the
+nominal model says how far the responses move.
+"""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from epv_env.plant.parameters import table
+from epv_env.plant.simulate import energised, simulate
+from identification.recordings.recording import OUTPUTS
+from identification.report_2003 import (
+    CALIBRATION_CASES,
+    CIRCUIT_PRESSURE,
+    ENERGISED_VOLTAGE,
+    SAMPLING_RATE,
+    SUPPLY_PRESSURE,
+    partial_error,
+    relative_error,
+    total_error,
+)
+
+PRINTED: dict[str, Any] = json.loads(
+    Path(__file__).with_name("printed_2003.json").read_text(encoding="utf-8")
+)
+"""Tables that the report prints."""
+
+FACTORS = (0.9, 1.1)
+"""The changes of Tables 8 and 9."""
+
+
+RELATIVE_AGREEMENT, ABSOLUTE_AGREEMENT = 0.1, 0.1
+"""A figure is reproduced if it differs from the printed one by at most this fraction of it, or by at
+most this many percentage points."""
+
+NOT_COUNTED = ("a1",)
+"""Its change is not printed: what it must have been is this project's guess."""
+
+
+def total_errors(p: Mapping[str, ArrayLike], U_on: float = ENERGISED_VOLTAGE) -> NDArray:
+    """Total error (eq. 21) of variants 1, 2, .. against variant 0, as fractions, (n - 1,).
+
+    p: parameters by symbol [SI], arrays (n,). U_on: voltage that holds the armature [V]. Raises
+    epv_env.plant.simulate.SimulationError.
+    """
+    partials = []
+    start = energised(p, p1=SUPPLY_PRESSURE, p2=CIRCUIT_PRESSURE, U=U_on)
+    for case in CALIBRATION_CASES:
+        U = case.voltage(U_on, SAMPLING_RATE)
+        run = simulate(p, initial=start, U=U, period=1 / SAMPLING_RATE)
+        outputs = [np.asarray(getattr(run.state, name)) for name in OUTPUTS]  # (samples, n) each
+        errors = [relative_error(y[:, 0], y[:, 1:], run.time) for y in outputs]
+        partials.append(partial_error(errors))
+    return total_error(partials)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ErrorSensitivity:
+    """Total errors (eq. 21), as fractions, that two changes of one parameter cause."""
+
+    minus: float
+    """With -10 %; for a1, which is zero, with the lower end of its domain."""
+    plus: float
+    """With +10 %; for a1 with the upper end of its domain."""
+
+    @property
+    def percentages(self) -> tuple[float, float]:
+        """Both total errors [%]."""
+        return 100 * self.minus, 100 * self.plus
+
+    @property
+    def sensitive(self) -> bool:
+        """Whether the total error reaches 2 % in either direction (section 5.2.2)."""
+        return max(self.minus, self.plus) >= 0.02
+
+    def as_json(self) -> dict[str, Any]:
+        """Errors in percent, and the class."""
+        minus, plus = self.percentages
+        return {"minus10": minus, "plus10": plus, "sensitive": self.sensitive}
+
+
+def printed_sensitivities(*tables: int) -> dict[str, tuple[float, float]]:
+    """Tables 8 and 9, or one of them: total errors for -10 % and +10 % by symbol [%]."""
+    rows = [row for table in tables or (8, 9) for row in PRINTED[f"table{table}"].items()]
+    return {symbol: (minus, plus) for symbol, (minus, plus) in rows}
+
+
+def changed_values(symbol: str, nominal: float) -> tuple[float, float]:
+    """The two values of one parameter that its row compares with the nominal one.
+
+    10 % of a zero is no change, yet Table 9 prints errors for a1: a parameter that is zero goes to
+    the ends of its domain instead.
+    """
+    domain = table()[symbol].domain
+    if nominal == 0.0 and domain is not None:
+        return domain
+    return FACTORS[0] * nominal, FACTORS[1] * nominal
+
+
+def variants(nominal: Mapping[str, float], symbols: Sequence[str]) -> dict[str, NDArray]:
+    """Parameters by symbol [SI], (variants,): the nominal ones, then each symbol lowered and raised.
+
+    There are 1 + 2 symbols variants.
+    """
+    p = {symbol: np.full(1 + 2 * len(symbols), value) for symbol, value in nominal.items()}
+    for row, symbol in enumerate(symbols):
+        p[symbol][1 + 2 * row : 3 + 2 * row] = changed_values(symbol, nominal[symbol])
+    return p
+
+
+def sensitivities(
+    nominal: Mapping[str, float],
+    symbols: Sequence[str],
+    *,
+    U_on: float = ENERGISED_VOLTAGE,
+) -> dict[str, ErrorSensitivity]:
+    """Total errors against the nominal model by symbol; all variants run in one batch."""
+    errors = total_errors(variants(nominal, symbols), U_on)
+    pairs = errors.reshape(-1, 2).tolist()
+    return {
+        symbol: ErrorSensitivity(minus=minus, plus=plus)
+        for symbol, (minus, plus) in zip(symbols, pairs, strict=True)
+    }
+
+
+def agreement_with_printed(rows: Mapping[str, ErrorSensitivity]) -> dict[str, Any]:
+    """How a computation meets the printed tables, JSON-ready.
+
+    'figures' and 'reproduced' count figures, 'worst_factor' is the largest ratio of two, either way, and
+    'classes_differ' names the symbols, a1 among them, whose class is another.
+    """
+    printed = printed_sensitivities()
+    pairs = [
+        pair
+        for symbol in printed
+        if symbol not in NOT_COUNTED
+        for pair in zip(rows[symbol].percentages, printed[symbol], strict=True)
+    ]
+    return {
+        "figures": len(pairs),
+        "reproduced": sum(_is_reproduced(*pair) for pair in pairs),
+        "classes_differ": [s for s in printed if rows[s].sensitive != table()[s].sensitive],
+        "worst_factor": max(max(a / b, b / a) for a, b in pairs),
+    }
+
+
+def _is_reproduced(percent: float, printed: float) -> bool:
+    return abs(percent - printed) <= max(RELATIVE_AGREEMENT * printed, ABSOLUTE_AGREEMENT)
