@@ -10,6 +10,7 @@ results.jsonl keeps each run, README.md the tables.
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -251,11 +252,10 @@ def tasks(
     for law in LAWS:
         for kind in KINDS:
             found[f"changes, {kind}, {law}"] = partial(detection, model, kind, law, *changed)
-    for number in range(max(runs.values())):
+    for kind, number in product(KINDS, range(max(runs.values()))):
         for soil in (soil for soil, own in runs.items() if number < own):
-            for kind in KINDS:
-                name = f"unchanged {number}, {soil}, {kind}"
-                found[name] = partial(false_alarms, model, kind, soil, number, *unchanged)
+            name = f"unchanged {number}, {soil}, {kind}"
+            found[name] = partial(false_alarms, model, kind, soil, number, *unchanged)
     return found
 
 
