@@ -62,6 +62,7 @@ class HypothesisPool:
         self.small = is_small(problem.plant)
         self.readings = sum(int(np.sum(run.trusted)) for run in problem.plant.runs)
         self.tolerated = tolerated_misfit(self.readings)
+        self._least = misfit(recalibrated)
         self._best: dict[frozenset[str], EvaluatedHypothesis] = {}
         self._posterior: Posterior | None = None
         self._finished: set[str] = set()
@@ -73,6 +74,7 @@ class HypothesisPool:
     def keep(self, found: Iterable[EvaluatedHypothesis]) -> None:
         """Keep each evaluated hypothesis that is better than the present one of its set."""
         for evaluated in found:
+            self._least = min(self._least, misfit(evaluated))
             labels = frozenset(evaluated.labels)
             present = self._best.get(labels)
             if present is None or self._order(evaluated) < self._order(present):
@@ -86,9 +88,10 @@ class HypothesisPool:
         """What counts when one of two fits of a set is kept [nats]: an open law must halve it.
 
         So the law of the catalogue is kept where it is about as good, and the two laws are left to those
-        causes that need them.
+        causes that need them. Where a fit leaves less than the stated noise, the noise is less.
         """
-        left = max(0.5 * (misfit(evaluated) - self.readings), 0.0)
+        noise = min(self._least / max(self.readings, 1), 1.0)
+        left = max(0.5 * (misfit(evaluated) / noise - self.readings), 0.0)
         return (left + self.tolerated) * 2.0 ** len(evaluated.estimate.hypothesis.laws)
 
     def __contains__(self, labels: frozenset[str]) -> bool:
