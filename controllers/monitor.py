@@ -48,6 +48,8 @@ RETURN = "return"
 """Name of a change that takes back the latest one: a repair, a supply that is restored."""
 RETURN_SHARE = 0.2
 """Prior probability of a return, once something has changed [-]."""
+CONFIRMED = 2
+"""Successive openings with odds beyond the threshold that make an alarm: one alone may lack a row."""
 SETTLING = 12
 """Openings for which an alarm must last until its change is settled: its cause needs them."""
 RELEARNT = 0.5 * np.pi / SETTLING
@@ -319,8 +321,8 @@ class Monitor:
 
     @property
     def alarm(self) -> bool:
-        """Whether the statistic has passed the threshold of the stated rate."""
-        return self.log_odds > 0.0
+        """Whether the statistic has passed the threshold of the stated rate, and still does."""
+        return self._alarms >= CONFIRMED
 
     @property
     def onset(self) -> float:
@@ -396,7 +398,7 @@ class Monitor:
             self.restart()
         self.history.append((self.time, self.log_odds))
         self._recent.append((departure, linear))
-        self._alarms = self._alarms + 1 if self.alarm else 0
+        self._alarms = self._alarms + 1 if self.log_odds > 0.0 else 0
         if self._alarms == SETTLING:
             self._settle()
 

@@ -16,6 +16,7 @@ import pytest
 from controllers.hysteresis import Hysteresis
 from controllers.monitor import (
     CONDITIONS,
+    CONFIRMED,
     FEATURES,
     LINEAR,
     RETURN,
@@ -92,6 +93,19 @@ def test_changes_and_a_return_are_found_dated_and_named() -> None:
     seconds = PERIODS * monitor.period
     for part, change in enumerate(monitor.changes, start=1):
         assert change.onset == pytest.approx(50 * part * seconds, abs=3 * seconds)
+
+
+def test_one_opening_alone_makes_no_alarm() -> None:
+    """As when a row is lost in it: all features look like an effect. The second one does."""
+    model, far = white_model(), np.full(N, 3.5)
+    model.shifts[0, :, 0] = far
+    monitor = Monitor(model)
+    for _ in range(20):
+        observe(monitor, 0.0 * far)
+    for alarm in (False, True):
+        observe(monitor, far)
+        assert monitor.log_odds > 0.0
+        assert monitor.alarm == alarm
 
 
 def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
@@ -217,7 +231,7 @@ def test_a_diagnosis_that_differs_is_explained() -> None:
         return agreement(monitor, log, [50.0, 100.0], content)
 
     assert said() == "The diagnosis agrees: no_gap."
-    monitor._log[1] = 50.0
+    monitor._log[1], monitor._alarms = 50.0, CONFIRMED
     assert "does not name second, by which the valve differs from the start on" in said()
     monitor._since[1] = 60.0
     assert "does not name second, which recalibration" in said()

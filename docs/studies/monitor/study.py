@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from controllers.base import Controller
-from controllers.monitor import RETURN, SHIPPED, Monitor, MonitorModel
+from controllers.monitor import CONFIRMED, RETURN, SHIPPED, Monitor, MonitorModel
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
@@ -119,9 +119,10 @@ def soiled(drive: NDArray, rng: np.random.Generator) -> Iterator[NDArray]:
 
 
 def alarms_of(monitor: Monitor) -> int:
-    """How often the statistic has passed the threshold from below."""
+    """How often an alarm began: the statistic has passed the threshold, and still does."""
     over = np.array([log_odds > 0.0 for _, log_odds in monitor.history])
-    return int(np.sum(np.diff(over.astype(int), prepend=0) > 0))
+    alarms = np.lib.stride_tricks.sliding_window_view(over, CONFIRMED).all(axis=1)
+    return int(np.sum(np.diff(alarms.astype(int), prepend=0) > 0))
 
 
 def false_alarms(

@@ -27,8 +27,8 @@ void epv_monitor_reset(epv_monitor *m, double false_alarms_per_hour);
 void epv_monitor_pause(epv_monitor *m);
 /* Once a control period. U: voltage of the energised coil [V]; pressures [bar absolute]; I [A]. */
 void epv_monitor_update(epv_monitor *m, int coil, double U, double p1, double p2, double p3, double I);
-/* That something has changed since the reference was learnt [-]; an alarm above 0.5. An alarm that lasts
- * becomes the reference: m->changes counts these. */
+/* That something has changed since the reference was learnt [-]; an alarm above 0.5 at two
+ * openings in a row: one alone may lack a row. An alarm that lasts becomes the reference: m->changes counts these. */
 double epv_monitor_probability(const epv_monitor *m);
 /* If something has changed: the probability of each effect into share[EPV_EFFECTS], and when [s].
  * contract.json names the effects in this order. */
