@@ -127,5 +127,6 @@ def test_the_study_runs_in_the_simulator(tmp_path):
     environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-m", "docs.studies.device.study", "--quick", "--out", tmp_path]
     subprocess.run(command, env=environment, check=True, timeout=600)
-    rows = json.loads((tmp_path / "figures.json").read_text())["checks"]
-    assert len(rows) == 2 + len(controllers())
+    found = json.loads((tmp_path / "figures.json").read_text())
+    assert len(found["checks"]) == 2 + len(controllers())
+    assert found["relief"][-1][-1] < 1e-5

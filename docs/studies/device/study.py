@@ -33,6 +33,9 @@ from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.files import write_text
 from epv_env.device.kernels import P2, Batch
 from epv_env.device.vector_env import SIMULATED
+from tests.benchmarks.relief_device import run_device
+from tests.benchmarks.relief_peers import run_scipy
+from tests.benchmarks.relief_valve import Task, flows
 from training.evaluation.metrics import METER, count_all
 from training.evaluation.on_device import NEVER, run_begun
 from training.evaluation.rollout import begin_episodes, make_env
@@ -203,11 +206,26 @@ def sweep(quick: bool) -> list[list[Any]]:
         return [[SWEEP, seconds(lambda: subprocess.run(command, shell=True, check=True))]]
 
 
+def relief(quick: bool) -> list[list[Any]]:
+    """The relief valve of arXiv 2011.01740, by step: maxima of the lift a second, and their error.
+
+    The error is that of the first ones, before chaos has enlarged any difference.
+    """
+    first, many = Task(flows=flows(8), transient=4, recorded=8), Task(flows=flows(30_720))
+    true, rows = run_scipy(first, "DOP853", 1e-12)[0], []
+    for step in (2e-2, 5e-3):
+        error = run_device(first, step)[0].error(true)  # compiles
+        found, took = run_device(first if quick else many, step)
+        rows.append([step, float(found.passed.sum() / took), error])
+    return rows
+
+
 PARTS: dict[str, tuple[Callable[[bool], list[list[Any]]], list[str]]] = {
     "checks": (checks, ["case", "greatest difference of p2 [mbar]", "other decisions"]),
     "steps": (steps, ["valves", "actions", "step [ms]", "simulated seconds a second"]),
     "episodes": (episodes, ["controller", "episodes", "simulated seconds a second"]),
     "sweep": (sweep, ["command", "time [s]"]),
+    "relief": (relief, ["step", "maxima a second", "error"]),
 }
 """What finds the rows of a table, and its headings, in the order in which they run."""
 
@@ -228,7 +246,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         find, headings = PARTS[name]
         known |= {"device": str(device), name: find(options.quick)}
         write_text(path, json.dumps(known, indent=1) + "\n")
-        rows = [[f"{x:,.3g}" if isinstance(x, float) else str(x) for x in row] for row in known[name]]
+        rows = [[f"{x:,.4g}" if isinstance(x, float) else str(x) for x in row] for row in known[name]]
         fill(options.out / PAGE, {"device": f"Measured on: {device}.", name: table(headings, rows)})
     return 0
 
