@@ -23,8 +23,8 @@ from epv_env.period import rules_of
 from tests.env.test_device import compiles, simulated
 from training.evaluation import batches
 from training.evaluation.metrics import METER, count
-from training.evaluation.on_device import NOTHING, run_begun
-from training.evaluation.rollout import make_env
+from training.evaluation.on_device import run_begun
+from training.evaluation.rollout import NOTHING, make_env
 from training.rare.episodes import Episodes
 
 pytestmark = pytest.mark.training

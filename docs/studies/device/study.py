@@ -36,9 +36,9 @@ from epv_env.device.vector_env import SIMULATED
 from tests.benchmarks.relief_device import run_device
 from tests.benchmarks.relief_peers import run_scipy
 from tests.benchmarks.relief_valve import Task, flows
-from training.evaluation.metrics import METER, count_all
-from training.evaluation.on_device import NEVER, run_begun
-from training.evaluation.rollout import begin_episodes, make_env
+from training.evaluation import rollout
+from training.evaluation.on_device import run_begun
+from training.evaluation.rollout import NEVER, begin_episodes, make_env
 
 FOLDER = Path(__file__).parent
 WITHIN_MBAR = 1e-6
@@ -80,24 +80,16 @@ def on_cpu(
     controller: Any, seeds: Sequence[int], periods: int, restart: int = NEVER, **options: Any
 ) -> tuple[NDArray, NDArray, dict[str, Any]]:
     """Episodes under a controller: decisions and p2 [Pa], (periods, 2, n), what is counted, and the
-    arguments of `run_begun` for the same episodes."""
+    arguments of `on_device.run_begun` for the same episodes."""
     env: Any = make_env(controller, len(seeds), **options)
-    seen, settings = begin_episodes(env, controller, seeds), env.settings
+    seen, task = begin_episodes(env, controller, seeds), env.task
     arguments = {
-        "controller": controller, "settings": settings, "begun": deepcopy(Batch.of(env.task)),
-        "noise": env.task._noise.copy(),
+        "controller": controller, "settings": env.settings, "begun": deepcopy(Batch.of(task)),
+        "noise": task._noise.copy(),
     }  # fmt: skip
-    record, meters = np.empty((periods, 2, len(seeds))), np.zeros(len(seeds), METER)
-    for k in range(periods):
-        if k == restart:
-            controller.reset(len(seeds))
-        record[k, 0] = controller.act(seen)
-        result = env.advance(record[k, 0])
-        seen, record[k, 1] = result.observation, env.task.valves.state.p2
-        count_all(
-            meters, result.figures, env.coil_energy, settings.control_period, settings.settling_time
-        )
-    return record, meters, arguments
+    record = np.empty((periods, 2, len(seeds)))
+    counted = rollout.run_begun(env, controller, seen, periods=periods, restart=restart, record=record)
+    return record, counted, arguments
 
 
 def on_host(n: int, periods: int) -> dict[str, Any]:
