@@ -200,13 +200,13 @@ ADAPTIVE_PULSE = Registration(
     controller=AdaptivePulse,
     build=_adaptive,
     search_space={
-        "trigger": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
-        "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),
-        "caution": Range(low=0.0, high=0.6, most=2.0),
-        "doubt": Range(low=0.0, high=1.5, most=4.0),
-        "filter_time": Range(low=0.004, high=0.04, log=True, least=0.001, most=0.4),
-        "look_ahead": Range(low=0.3, high=1.5, least=0.0, most=4.0),
-        "rounding": Range(low=0.2, high=1.2, least=0.0, most=2.0),
+        "trigger": Range(low=-0.3, high=0.1),
+        "aim": Range(low=-0.1, high=0.3),
+        "caution": Range(low=0.0, high=0.6),
+        "doubt": Range(low=0.0, high=1.5),
+        "filter_time": Range(low=0.004, high=0.04, log=True),
+        "look_ahead": Range(low=0.3, high=1.5),
+        "rounding": Range(low=0.2, high=1.2),
     },
 )
 
