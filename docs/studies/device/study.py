@@ -195,7 +195,8 @@ def sweep(quick: bool) -> list[list[Any]]:
         return []
     with TemporaryDirectory() as folder:
         command = f"{sys.executable} -m training.{SWEEP}{folder}/out"
-        return [[SWEEP, seconds(lambda: subprocess.run(command, shell=True, check=True))]]
+        quiet = {"stdout": subprocess.DEVNULL}  # its next command is about this folder
+        return [[SWEEP, seconds(lambda: subprocess.run(command, shell=True, check=True, **quiet))]]
 
 
 def relief(quick: bool) -> list[list[Any]]:
