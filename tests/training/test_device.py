@@ -32,7 +32,7 @@ from training.rare.episodes import Episodes
 pytestmark = pytest.mark.training
 
 N, PERIODS, RESTART = 3, 40, 20
-OPEN = {"open_below": 0.0, "shut_above": 0.0}
+OPEN: dict[str, Any] = {"open_below": 0.0, "shut_above": 0.0}
 SEEDS = [3, 4, 5]
 OPTIONS: dict[str, Any] = {
     "settling_time": 0.05, "scenario": "emergency", "drop_bar": (0.2, 0.6),
