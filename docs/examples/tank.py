@@ -13,14 +13,12 @@ from copy import copy
 from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_text
 from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import diagnose
-from identification.gap.locate.localisation import MissingTerm
 from identification.gap.plant import (
     Cause,
     Channel,
@@ -30,7 +28,6 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.report.figures import missing_term_figure
 from identification.gap.report.gap_json import write_results
 from identification.gap.report.page import sections
 from identification.gap.report.sentences import verdict_sentence
@@ -237,28 +234,12 @@ LEAKING = {"c": 0.021, "leak": 4e-3}
 """The virtual tank; its recordings are written to --out, and read from there."""
 
 
-def term_and_truth(term: MissingTerm) -> Figure:
-    """The missing term of the virtual tank beside the true one: the leak, and a multiple of √h.
-
-    No recording tells the multiple, since c absorbs it: it is the one that comes nearest.
-    """
-    root, leak = np.sqrt(term.x), 1e3 * LEAKING["leak"] * term.x
-    multiple = root @ (term.y + leak) / (root @ root)
-    figure = missing_term_figure(term)
-    axes = figure.axes[0]
-    label = f"truth: {multiple:.1f} √h - {1e3 * LEAKING['leak']:g} h"
-    axes.plot(term.x, multiple * root - leak, "--", color="tab:red", label=label)
-    axes.legend(fontsize="small")
-    return figure
-
-
 def main() -> int:
     """Diagnose, write gap.json and report.html, print the verdict; returns the exit status."""
     parser = argparse.ArgumentParser(description="Why a model of a tank misses its recordings.")
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
     parser.add_argument("--recordings", type=Path, default=None, help="folder of your own CSV files")
     parser.add_argument("--seed", type=int, default=0, help="of resampling, and of the virtual noise")
-    parser.add_argument("--images", type=writable_folder, default=None, help="folder of gap-tank.png")
     chosen = parser.parse_args()
     folder = chosen.recordings
     if folder is None:
@@ -268,10 +249,6 @@ def main() -> int:
     write_results(diagnosis, chosen.out)
     title = f"Gap between model and recordings: {folder}"
     write_page(chosen.out / "report.html", title=title, sections=sections(diagnosis))
-    term = diagnosis.localisation.missing_term
-    if chosen.images and term and chosen.recordings is None:
-        chosen.images.mkdir(parents=True, exist_ok=True)
-        term_and_truth(term).savefig(chosen.images / "gap-tank.png", dpi=100)
     print(verdict_sentence(diagnosis)[1])
     return 0
 
