@@ -8,8 +8,14 @@ import pytest
 
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration.calibrate import Calibration
-from identification.pipeline.identification import ESTIMATOR, Identification
-from identification.pipeline.summary import common_reasons, judge_values, summary_section, worst
+from identification.pipeline.identification import (
+    ESTIMATOR,
+    Identification,
+    common_reasons,
+    judge_values,
+    summary_section,
+    worst,
+)
 from identification.report.page import Table
 from identification.validation import Validation, validate
 from tests.identification.confidence.results import twin_confidence
