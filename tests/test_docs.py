@@ -1,6 +1,5 @@
 """What the documentation shows runs as printed, and its links and names lead somewhere."""
 
-import ast
 import importlib
 import json
 import os
@@ -181,30 +180,6 @@ def test_pages_are_short():
     assert words["README.md"] <= 900
     assert {page: count for page, count in words.items() if count > 2500} == {}
     assert {p: n for p, n in words.items() if p.startswith("docs/studies") and n > 1200} == {}
-
-
-def imported_packages(page: str) -> dict[str, set[str]]:
-    """Rows of the table of packages: what each may import."""
-    rows = re.findall(r"^\| `([\w.]+)` \|.*\| ([^|]*) \|$", text(page), re.M)
-    return {name: set(re.findall(r"`([\w.]+)`", may)) for name, may in rows}
-
-
-def test_the_page_of_the_architecture_says_who_imports_whom():
-    allowed = imported_packages("docs/architecture.md")
-    assert len(allowed) > 6
-
-    def group(name: str) -> str | None:
-        fitting = [g for g in allowed if f"{name}.".startswith(f"{g}.")]
-        return max(fitting, key=len, default=None)
-
-    for package in PACKAGES:
-        for path in (ROOT / package).rglob("*.py"):
-            own = group(".".join(path.relative_to(ROOT).with_suffix("").parts))
-            assert own is not None, path
-            nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            names = {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
-            others = {group(name) for name in names} - {own, None}
-            assert others <= allowed[own], f"{path} imports {others - allowed[own]}"
 
 
 def test_the_site_builds_without_a_warning(tmp_path):

@@ -145,8 +145,6 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
     tiled: parameters and shifts by lane.
     """
     p2_shift, flow_shift, flow_ramp = (np.asarray(tiled.pop(shift)) for shift in SHIFTS)
-    valves = Valves(n * len(drives))
-    valves.set_parameters(np.arange(valves.n), tiled)
     p1, U, p2 = (
         np.repeat([getattr(drive, name) for drive in drives], n, axis=0)
         for name in ("p1_start", "U_start", "p2_start")
@@ -155,8 +153,7 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
     supply = 1.0 / (1.0 + np.asarray(tiled["g_p1"]))
     p2 = (p2 - tiled["b_p2"]) / (1.0 + np.asarray(tiled["g_p2"]))
     initial = energised(tiled, p1=p1 * supply, p2=p2 + p2_shift, U=U)
-    for field, value in zip(valves.state, initial, strict=True):
-        field[:] = value
+    valves = Valves.started(n * len(drives), tiled, initial)
     inputs, duration = _inputs(drives)
     steps = len(duration)
     outputs = np.empty((len(OUTPUTS), 1 + steps, valves.n))

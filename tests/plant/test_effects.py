@@ -104,10 +104,8 @@ def test_air_is_conserved_with_every_effect_on():
     p = CALIBRATED
     for name in CATALOGUE:
         p = p.replace(**{s: sized(name, 0.1)[s] for s in CATALOGUE[name]})
-    valves = Valves(1)
-    valves.set_parameters(np.arange(1), p, 0.02)
-    for field, value in zip(valves.state, energised(p, p1=12e5, p2=6e5, U=24.0), strict=True):
-        field[:] = value
+    initial = energised(p, p1=12e5, p2=6e5, U=24.0)
+    valves = Valves.started(1, p, initial, reservoir_volume=0.02)
     start = State(*(field.copy() for field in valves.state))
     U = np.where(np.arange(200) % 50 < 25, 0.0, 24.0)[:, None]
     end = valves.record(Inputs(U, *np.zeros((3, 200, 1))), 5e-3)
@@ -124,10 +122,7 @@ def test_air_is_conserved_with_every_effect_on():
 @numba.njit
 def _magnet(q, u, c, e):
     inverse_Rm = reluctance_inverse(q, c)
-    return (
-        current_rate(q, u, c, inverse_Rm, e, True),
-        armature_force(q, c, inverse_Rm, e, True),
-    )
+    return (current_rate(q, u, c, inverse_Rm, e, True), armature_force(q, c, inverse_Rm, e, True))
 
 
 def test_a_saturating_magnet_with_remanence_conserves_energy():

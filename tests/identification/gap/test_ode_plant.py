@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from docs.examples.tank import AREA, PERIOD, START, levels
 from identification.gap.diagnosis import diagnose
 from identification.gap.fit.gaps import WHOLE
-from identification.gap.plant import Cause, Channel, GreyBox, Run, window_forcing
+from identification.gap.plant import Cause, GreyBox, Run, window_forcing
 from tests.identification.gap.ode_plants import decay, decay_rate, free, quiet_run
 
 
@@ -87,23 +86,6 @@ def test_states_and_inputs_are_traces_and_regimes_may_be_missing():
     assert np.sum(high) == 2  # exp(-t) > 1/2 at 0 and 0.5 s
 
 
-def test_the_tank_is_that_of_the_example():
-    q = np.repeat([0.015, 0.002, 0.01], 40)
-    values = {"c": np.array([0.021, 0.025]), "leak": np.array([4e-3, 0.0])}
-    plant = decay(
-        [quiet_run(PERIOD, len(q), q=q)],
-        states=("h",),
-        rate=lambda x, u, p: (u.q / AREA - p.c * np.sqrt(x.h) - p.leak * x.h,),
-        readings=lambda x, u, p: (x.h,),
-        start=lambda run, p: (START,),
-        parameters=[free("c", 0.02)],
-        causes=[Cause(name="leak", component="tank", parameters=(free("leak", 0.0, (1e-3,)),))],
-        forcing_steps={},
-    )
-    fine = levels(values, np.repeat(q, 200), PERIOD / 200)[::200]
-    np.testing.assert_allclose(plant.outputs(values, [0])[0][0], fine, atol=2e-6)
-
-
 def noisy_runs() -> list[Run]:
     """Two recordings of a plant whose gain is 1.4."""
     rng, runs = np.random.default_rng(3), []
@@ -153,13 +135,6 @@ def test_the_diagnosis_takes_the_plant():
 def test_a_wrong_description_is_refused_in_a_sentence(changes, sentence):
     with pytest.raises(ValueError, match=sentence):
         decay(**changes)
-
-
-def test_without_a_stated_noise_the_readings_show_how_fine_the_steps_must_be():
-    rng = np.random.default_rng(0)
-    noisy = replace(quiet_run(0.5, 21, q=np.zeros(21)), measured=1e-3 * rng.standard_normal((1, 21)))
-    unknown = [Channel(name="y", unit="m", scale=1.0)]
-    assert decay([noisy], channels=unknown).steps_per_sample == decay([noisy]).steps_per_sample
 
 
 def test_a_function_that_numba_refuses_is_named():

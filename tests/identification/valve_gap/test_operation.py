@@ -200,12 +200,6 @@ def scaled(column, factor, offset=0.0):
     return change
 
 
-def gauge(text):
-    for column in ("p1_bar", "p2_bar", "p3_bar"):
-        text = scaled(column, 1.0, -1.0)(text)
-    return text
-
-
 def one_wild(text):
     return text.replace(",24.00,", ",1e300,", 1)
 
@@ -226,9 +220,7 @@ def often_opened(tmp_path_factory):
     ("change", "told"),
     [
         (scaled("p2_bar", 100.0), "p2_bar looks like kPa: give bar absolute"),
-        (gauge, "p3 vents towards -.* p1_bar, p2_bar and p3_bar look like gauge"),
         (scaled("p3_bar", 1.0, -1.0), "p3_bar looks like gauge pressure"),
-        (scaled("U_supply_V", 1e300), "6 to 32.32 V are usual: check unit, sign"),
         (scaled("I_A", -1.0), "I_A looks like a current with its sign flipped"),
         (scaled("I_A", 0.0, -1.0), "line 2?[0-9]+: .*and coils have 8 to 220 ohm"),
         (one_wild, r"drive-1.csv, line 2: U_supply_V is 1e\+300, outside the sensor's range"),

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as xml
 
-DOUBLES = ctypes.POINTER(ctypes.c_double)
 LOGGER = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, *[ctypes.c_char_p, ctypes.c_int, *[ctypes.c_char_p] * 3]
 )

@@ -1,8 +1,9 @@
-"""The benchmark's relief valve: its integrators agree on impacts and on maxima of the lift."""
+"""The benchmarks: the relief valve's integrators agree; workloads count what they simulate."""
 
 import numpy as np
 import pytest
 
+from tests.benchmarks.interfaces import INTERFACES
 from tests.benchmarks.relief_peers import NoOdeintError, build, run_odeint, run_scipy
 from tests.benchmarks.relief_valve import Task, run_lanes
 
@@ -52,3 +53,20 @@ def test_odeint_agrees_with_scipy(true, tmp_path):
     found, seconds = run_odeint(program, TASK, 1e-10)
     assert found.error(true) < 1e-7
     assert seconds > 0.0
+
+
+SHARE = 0.005
+"""Of a workload's usual length."""
+
+
+@pytest.mark.training
+def test_a_workload_counts_whole_periods_of_all_its_valves():
+    pytest.importorskip("stable_baselines3")
+    for name, interface in INTERFACES.items():
+        valves = next((n for n in (256, 1024) if f"{n} valves" in name), 1)
+        run = interface.begin(SHARE)
+        periods = run()
+        assert periods > 0, name
+        assert periods % valves == 0, name
+        assert run() == periods, name
+        assert interface.kernel is None or interface.kernel in INTERFACES
