@@ -123,7 +123,9 @@ def likeliest_span(
     prior = np.array([np.log(KINDS[kind] / kinds.count(kind)) for kind in kinds])
     misfits = (squares / np.min(squares) - 1.0) * readings / 2.0
     chances = softmax(log_likelihoods(misfits, readings) + prior)
-    best = int(np.argmax(chances))
+    # A drive without fitted openings makes ties: the shortest span has what shows the cause.
+    lengths = [end - first for first, end in spans]
+    best = min(range(len(spans)), key=lambda k: (-round(float(chances[k]), 6), lengths[k]))
     return Span(*spans[best], float(chances[best]), kinds[best] == "whole")
 
 

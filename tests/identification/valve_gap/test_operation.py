@@ -18,7 +18,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.signals import OptionError
 from identification.__main__ import main
 from identification.gap.fit.variable_projection import LinearisedRun
-from identification.gap.search.onset import Onset, Span, in_span, spans_of_causes
+from identification.gap.search.onset import Onset, Span, in_span, likeliest_span, spans_of_causes
 from identification.recordings.log_files import Drive, Log, read_log
 from identification.recordings.openings import drive_of, openings, pauses, start_of
 from identification.recordings.recording import CampaignError, Recording
@@ -123,6 +123,11 @@ def test_each_cause_has_its_drives_also_beside_another_one():
         assert (spans[label].first, spans[label].end) == true[label]
         assert spans[label].probability > 0.9
     assert spans["first"].onset(["a", "b", "c", "d"]) == Onset("b", spans["first"].probability, "d")
+
+
+def test_of_spans_that_no_opening_tells_apart_the_shortest_is_taken():
+    spans = [(0, 3), (1, 3), (2, 3)]  # nothing was compared in the second drive
+    assert likeliest_span(np.array([900.0, 500.0, 500.0]), spans, 3, 500).first == 2
 
 
 @pytest.mark.parametrize(("grams", "count"), [(0.0, 4), (-0.3, 4), (0.3, 0)])
