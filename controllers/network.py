@@ -38,8 +38,10 @@ def forward(weights, inputs, signals):
         for i in range(n):
             at += m
             value = inputs[i] if layer == 0 else source[i]
-            for j in range(m):  # the inner loop runs over outputs: a CPU can vectorise it
+            j = 0  # the inner loop runs over outputs: a CPU can vectorise it
+            while j < m:  # no range: an accelerator's compiler would allow for negative indices
                 out[j] += value * weights.numbers[at + j]
+                j += 1
         at += m
         if layer < last:
             for j in range(m):
