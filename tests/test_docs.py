@@ -18,7 +18,6 @@ pytestmark = pytest.mark.training
 
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
-from docs.scripts import notebook  # noqa: E402
 from epv_env.common.commands import commands  # noqa: E402
 from epv_env.common.options import parse  # noqa: E402
 from epv_env.plant.plantfile import load_plant  # noqa: E402
@@ -202,17 +201,15 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert example.lstrip().startswith('<div class="language-python highlight">')
 
 
-def test_the_notebook_prints_and_draws_what_it_shows():
-    """Its outputs are written by `python -m docs.scripts.notebook`."""
-    cells, again = notebook.read()["cells"], notebook.read()["cells"]
+def test_the_cells_of_the_notebook_run_and_print_what_it_shows():
+    cells = json.loads(text("docs/start/ten-cells.ipynb"))["cells"]
     assert len(cells) == 10
-    notebook.run(again)
-    assert [_shown(cell) for cell in again] == [_shown(cell) for cell in cells]
-    assert len(notebook.pictures()) == 4
-
-
-def _shown(cell: notebook.Cell) -> list[tuple[str, list[str]]]:
-    return [(output["output_type"], output.get("text", [])) for output in cell.get("outputs", [])]
+    outputs = [output for cell in cells for output in cell.get("outputs", [])]
+    assert sum(output["output_type"] == "display_data" for output in outputs) == 4
+    code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+    done = run(sys.executable, "-c", code, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "".join(line for output in outputs for line in output.get("text", []))
 
 
 def test_how_good_it_is_stands_behind_each_row():

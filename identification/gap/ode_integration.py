@@ -17,7 +17,6 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from identification.gap.fit.laws import KNOTS, MOST_LAWS
-from identification.gap.runge_kutta import advancing
 
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
@@ -132,6 +131,35 @@ def delayed_mean(total: NDArray, since: float, length: float) -> float:
     return (values[1] - values[0]) / length
 
 
+def stepping(rate: Callable, wrap: Callable) -> Callable:
+    """A function (x, t, h, u, p, push, work): a classical Runge-Kutta step of x (states,) by h [s].
+
+    push: forcing of the rates, (states,). work: scratch, (5, states): four slopes and a stage.
+
+    rate: derivatives of the states, as `Records.flat` makes it. wrap: compiles a function, or leaves it.
+    """
+
+    @wrap
+    def slope(x, t, u, p, push, out):
+        rate(x, t, u, p, out)
+        for i in range(len(x)):
+            out[i] += push[i]
+
+    @wrap
+    def step(x, t, h, u, p, push, work):
+        slope(x, t, u, p, push, work[0])
+        for stage in range(1, 4):
+            part = h if stage == 3 else 0.5 * h
+            for i in range(len(x)):
+                work[4, i] = x[i] + part * work[stage - 1, i]
+            slope(work[4], t + part, u, p, push, work[stage])
+        for i in range(len(x)):
+            inner = work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]
+            x[i] += h / 6.0 * inner
+
+    return step
+
+
 Simulation = Callable[["Job"], tuple[NDArray, NDArray]]
 """Gives readings (channels, samples, n) and states (states, samples, n) [SI]; NaN from where a candidate
 fails."""
@@ -158,11 +186,11 @@ class Job:
     n) for none."""
 
 
-def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> Simulation:
+def alone(step: Callable, read: Callable, channels: int, wrap: Callable) -> Simulation:
     """A simulation in which each candidate has a loop of its own.
 
     Args:
-        advance: of `advancing`.
+        step: of `stepping`.
         read: readings from states, as `Records.flat` makes it.
         channels: number of readings.
         wrap: compiles a function, or leaves it as it is.
@@ -193,10 +221,10 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
                 if s == 0:
                     states[:, k] = x
                     read(x, k * period, u, p, readings[:, k])
-                advance(x, begin * period, period / substeps, u, p, pushed, work)
+                step(x, begin * period, period / substeps, u, p, pushed, work)
 
     def simulate(job: Job) -> tuple[NDArray, NDArray]:
-        n, work = job.start.shape[1], np.empty((6, len(job.start)))
+        n, work = job.start.shape[1], np.empty((5, len(job.start)))
         states = np.full((n, len(job.start), len(job.inputs)), np.nan)
         readings = np.full((n, channels, len(job.inputs)), np.nan)
         # Integrals of the held inputs [sampling periods], (samples + 1, inputs).
@@ -215,7 +243,7 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
                 lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
                 reason = next((line for line in lines if "Failed in" not in line), lines[0])
                 raise ValueError(
-                    f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
+                    f"rate or readings cannot be compiled by numba ({reason}): let them use "
                     "numbers, numpy and functions under numba.njit only, or choose mode='python'"
                 ) from error
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
@@ -228,7 +256,7 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
 
     Args:
         records: the plant's names.
-        functions: rate, readings and thresholds of records, each with its number of results.
+        functions: rate and readings of records, each with its number of results.
         mode: "compiled" or "python".
 
     Raises:
@@ -237,10 +265,8 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     if mode not in ("compiled", "python"):
         raise ValueError(f"mode '{mode}' is none of compiled, python: choose one of them")
     own: Callable = compiled if mode == "compiled" else lambda function: function
-    rate, read, thresholds = (own(records.flat(own(f), results, own)) for f, results in functions)
-    channels, count = functions[1][1], functions[2][1]
-    advance = advancing(rate, thresholds, count, own)
-    return alone(advance, read, channels, own)
+    rate, read = (own(records.flat(own(f), results, own)) for f, results in functions)
+    return alone(stepping(rate, own), read, functions[1][1], own)
 
 
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:

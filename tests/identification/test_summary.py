@@ -7,8 +7,14 @@ import numpy as np
 
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration.calibrate import Calibration
-from identification.pipeline.identification import ESTIMATOR, Identification
-from identification.pipeline.summary import common_reasons, judge_values, summary_section, worst
+from identification.pipeline.identification import (
+    ESTIMATOR,
+    Identification,
+    common_reasons,
+    judge_values,
+    summary_section,
+    worst,
+)
 from identification.recordings.recording import Campaign
 from identification.report.page import Table
 from identification.validation import Validation, validate

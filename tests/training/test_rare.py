@@ -91,6 +91,13 @@ def test_the_command_resumes_and_describes_the_episodes_that_leave(tmp_path, cap
     assert "PWM leaves" in capsys.readouterr().out
 
 
+def test_a_device_that_is_not_there_is_refused(tmp_path, capsys):
+    words = ["--quick", "--device", "cuda", "--out", str(tmp_path / "out")]
+    assert main_of("training.commands.rare", program="epv rare", arguments=words) == 2
+    assert "needs an NVIDIA accelerator" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
 def random_observations(n, rng):
     """Observations with nothing in common but the box of the 13 readings, all near the band."""
     seen = LIMIT * rng.uniform(-1.0, 1.0, (n, len(LAYOUT)))

@@ -48,27 +48,6 @@ def decay(runs=None, **changes) -> OdePlant:
     )
 
 
-def block_rate(x, u, p):
-    return x.v, u.pull - p.k * x.s - p.friction * np.sign(x.v)
-
-
-def block(runs, mode="compiled", steps=1, thresholds=True) -> OdePlant:
-    """A block of 1 kg on a spring, with Coulomb friction."""
-    return OdePlant(
-        runs=runs,
-        channels=[Channel(name="s", unit="m", scale=1.0, noise=1e-3)],
-        states=("s", "v"),
-        rate=block_rate,
-        readings=lambda x, u, p: (x.s,),
-        start=lambda run, p: (1.0, 0.0),
-        parameters=[free("k", 1.0)],
-        causes=[Cause(name="friction", component="block", parameters=(free("friction", 0.13),))],
-        thresholds=(lambda x, u, p: (x.v,)) if thresholds else None,
-        mode=mode,
-        steps_per_sample=steps,
-    )
-
-
 NOISE = 2e-3
 """Of the angle's readings [rad]."""
 

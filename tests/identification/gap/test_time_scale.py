@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.gap.plant import Channel, Run
-from identification.gap.prepare.time_scale import time_scale
+from identification.gap.prepare.prepared_plant import time_scale
 from identification.valve_gap.valve import TIME_SCALE
 
 
