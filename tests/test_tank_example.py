@@ -5,15 +5,7 @@ import json
 import numpy as np
 import pytest
 
-from docs.examples.tank import (
-    AREA,
-    START,
-    Tank,
-    levels,
-    main,
-    readings,
-    virtual_recordings,
-)
+from docs.examples.tank import START, Tank, levels, main, readings, virtual_recordings
 from identification.gap.plant import window_forcing
 
 PERIOD = 0.5
@@ -28,13 +20,6 @@ def test_a_draining_tank_follows_torricelli_to_first_order():
     ]
     assert errors[0] < 5e-4
     assert errors[0] / errors[1] == pytest.approx(10, rel=0.01)
-
-
-def test_a_tank_settles_where_outflow_and_leak_are_the_inflow():
-    c, leak = 0.02, 4e-3
-    values = {"c": np.array([c]), "leak": np.array([leak])}
-    h = levels(values, np.full(4000, 0.008), PERIOD)[-1, 0]
-    assert c * np.sqrt(h) + leak * h == pytest.approx(0.008 / AREA, rel=1e-9)
 
 
 def test_a_lagging_sensor_is_63_percent_there_after_its_time_constant():

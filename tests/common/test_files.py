@@ -113,12 +113,6 @@ def full_disk():
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
 
 
-def test_a_journal_on_a_full_disk_is_named(tmp_path):
-    journal = Journal(tmp_path / "finished.jsonl", {})
-    with full_disk(), pytest.raises(OSError, match=f"cannot write: .*{journal.path}"):
-        journal.add("one", "x" * 10_000)
-
-
 def test_a_file_of_forty_gigabytes_is_refused_unread(tmp_path):
     with (tmp_path / "sparse.json").open("wb") as stream:
         stream.truncate(40 * 10**9)

@@ -21,15 +21,6 @@ def test_stable_baselines3_checker(identifier):
     checker.check_env(gymnasium.make(identifier))
 
 
-def test_gymnasium_s_passive_checker_accepts_a_whole_episode(identifier):
-    """`make` wraps the passive checker around the environment."""
-    env = gymnasium.make(identifier, max_episode_steps=50)
-    assert "PassiveEnvChecker" in str(env)
-    env.reset(seed=0)
-    truncated = [env.step(command)[3] for command in actions(identifier, 1, 50)[:, 0]]
-    assert truncated == [False] * 49 + [True]
-
-
 def test_gymnasium_s_vector_wrappers_accept_the_batch(identifier):
     env = RecordEpisodeStatistics(NormalizeObservation(native(identifier, 3, max_episode_steps=10)))
     env.reset(seed=0)

@@ -66,13 +66,6 @@ def test_the_piston_lifts_by_its_stroke() -> None:
     assert rubber[0] - rubber[1] == geometry.STROKE_PV
 
 
-def test_a_chamber_has_the_colour_of_its_pressure() -> None:
-    for snapshot in (SHUT, OPEN):
-        image = frame(snapshot)
-        place = int(geometry.CEILING) + 8, int(geometry.PV - geometry.PISTON) + 12
-        assert tuple(image[place]) == canvas.pressure_colour(snapshot.p3_bar)
-
-
 def test_the_badge_tells_whether_p2_is_within_the_tolerance() -> None:
     badge = (896, 16, 1130, 52)
     inside, outside = frame(SHUT), frame(replace(SHUT, p2_bar=9.1))

@@ -140,10 +140,6 @@ def test_pairing_takes_away_what_both_met():
     assert found.high - found.low < 0.1
 
 
-def test_the_first_episodes_pair_where_one_has_fewer():
-    assert paired_difference(np.zeros(10), np.ones(3)).value == -1.0
-
-
 def test_the_ranges_do_not_meet():
     firsts = sorted(seed for name, seed in vars(seeds).items() if name.endswith("_SEED"))
     assert min(b - a for a, b in pairwise(firsts)) >= seeds.RANGE

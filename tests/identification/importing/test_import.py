@@ -1,6 +1,5 @@
 """Files of benches in many dialects become the same campaign; what is unclear is refused."""
 
-import json
 import sys
 
 import numpy as np
@@ -54,19 +53,6 @@ def test_a_dry_run_shows_everything_and_writes_nothing(tmp_path, capsys):
     assert "2000 Hz" in shown
     assert "nothing is written" in shown
     assert sorted(p.name for p in tmp_path.iterdir()) == ["test1.csv"]
-
-
-def test_a_mapping_file_names_the_rest(tmp_path):
-    columns = {f"K{i}": pair for i, pair in enumerate(columns_of(bench().recordings[0]).values())}
-    path = text(tmp_path / "a.csv", columns, bracket=False)
-    units = ("s", "A", "V", "bar abs", "bar abs", "bar abs")
-    names = ("time", "I", "U", "p1", "p2", "p3")
-    channels = {n: {"source": f"K{i}", "unit": units[i]} for i, n in enumerate(names)}
-    content = {"format": "epv-mapping/1", "channels": channels,
-               "recordings": {"a.csv": {"role": "validation", "name": "b"}}}  # fmt: skip
-    (tmp_path / "map.json").write_text(json.dumps(content))
-    made = import_campaign([path], tmp_path / "out", mapping=tmp_path / "map.json").campaign
-    assert (made.recordings[0].name, made.recordings[0].role) == ("b", "validation")
 
 
 @pytest.mark.parametrize("ending", ["g", " g", "(g)", " (g)", " gauge", " rel.", "-ü"])
