@@ -145,16 +145,17 @@ def restart(b, starts, r, key, instead):
 
 
 @cache
-def step_kernel(rule: Callable[..., Any], extended: bool) -> Any:
+def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
     """The kernel that takes one control period of all valves with or without effects.
 
     rule: of one action (actions.py).
     """
+    extended = True if with_effects else None
 
     @cuda.jit
     def step(b, r, rules, actions, slots, key, limits, longest):
         i = cuda.grid(1)  # type: ignore[call-arg]
-        if i >= len(b.episodes) or b.with_effects[i] != extended or r.begun[i]:
+        if i >= len(b.episodes) or b.with_effects[i] != with_effects or r.begun[i]:
             return
         e = b.episodes[i]
         r.on_time[i], r.action[i], valid = rule(float(actions[i]), rules[0].control_period, slots)

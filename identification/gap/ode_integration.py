@@ -6,6 +6,7 @@ is a smooth function of the delay, as a fit needs it. Before the run the first s
 """
 
 import keyword
+import re
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -17,7 +18,7 @@ from numba.core.errors import NumbaError
 from numpy.typing import NDArray
 
 from identification.gap.fit.laws import KNOTS, MOST_LAWS
-from identification.gap.runge_kutta import advancing
+from identification.gap.runge_kutta import advancing, compiled, copy
 
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
@@ -67,11 +68,11 @@ class Records:
         self.u = record("input", (TIME, *self.inputs))
         self.p = record("parameter", self.symbols)
 
-    def flat(self, function: Callable, count: int, wrap: Callable) -> Callable:
+    def flat(self, function: Callable, count: int) -> Callable:
         """A function (x, t, u, p, out) of arrays that writes `count` results into `out`.
 
         The arrays' axes are states, inputs, symbols with the laws behind them, and results. The text is
-        generated, as numba needs every field written out. wrap: compiles a function, or leaves it.
+        generated, as numba needs every field written out.
         """
         x = ", ".join(f"x[{i}]" for i in range(len(self.states)))
         u = ", ".join(["t", *(f"u[{i}]" for i in range(len(self.inputs)))])
@@ -84,9 +85,9 @@ class Records:
             "    return out",
         ]
         names = {"function": function, "State": self.x, "Input": self.u, "Parameter": self.p}
-        names["lawful"] = wrap(self._lawful())
+        names["lawful"] = compiled(self._lawful())
         exec("\n".join(lines), names)
-        return names["flat"]
+        return compiled(names["flat"])
 
     def _lawful(self) -> Callable:
         """A function (x, u, p) that gives the symbols as strong as their laws make them."""
@@ -114,13 +115,9 @@ class Records:
         return lawful
 
 
-def compiled(function: Callable) -> Callable:
-    """The function compiled by numba; divisions by zero give inf, as in numpy."""
-    return function if hasattr(function, "py_func") else numba.njit(error_model="numpy")(function)
-
-
+@compiled
 def delayed_mean(total: NDArray, since: float, length: float) -> float:
-    """Mean of a held input over a stretch; numba compiles this function.
+    """Mean of a held input over a stretch.
 
     total: integral of the input, (samples + 1,). since, length: of the stretch [sampling periods].
     """
@@ -158,25 +155,30 @@ class Job:
     n) for none."""
 
 
-def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> Simulation:
+def _reason(error: NumbaError) -> str:
+    """The innermost of numba's nested reasons, without its colours."""
+    lines = re.sub(r"\x1b\[\d*m", "", str(error)).splitlines()
+    words = re.compile("No implementation|Untyped|Unsupported|Unknown|Use of|Cannot")
+    return next((line.strip() for line in reversed(lines) if words.search(line)), lines[0])
+
+
+def alone(advance: Callable, read: Callable, channels: int, *, compile_it: bool) -> Simulation:
     """A simulation in which each candidate has a loop of its own.
 
     Args:
         advance: of `advancing`.
         read: readings from states, as `Records.flat` makes it.
         channels: number of readings.
-        wrap: compiles a function, or leaves it as it is.
+        compile_it: whether numba compiles the loop, with all that it calls.
     """
-    mean = wrap(delayed_mean)
 
-    @wrap
+    @compiled
     def finite(x):
         total = 0.0
         for value in x:
             total += value
         return np.isfinite(total)
 
-    @wrap
     def loop(x, inputs, total, delays, p, period, substeps, push, work, states, readings):
         u, none = np.empty(inputs.shape[1]), np.zeros(len(x))
         for k in range(len(inputs)):
@@ -189,11 +191,14 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
                     if delays[i] == 0.0:
                         u[i] = inputs[k, i]
                     else:
-                        u[i] = mean(total[:, i], begin - delays[i] / period, 1.0 / substeps)
+                        u[i] = delayed_mean(total[:, i], begin - delays[i] / period, 1.0 / substeps)
                 if s == 0:
-                    states[:, k] = x
+                    copy(x, states[:, k])
                     read(x, k * period, u, p, readings[:, k])
                 advance(x, begin * period, period / substeps, u, p, pushed, work)
+
+    if compile_it:
+        loop = numba.njit(error_model="numpy")(loop)
 
     def simulate(job: Job) -> tuple[NDArray, NDArray]:
         n, work = job.start.shape[1], np.empty((6, len(job.start)))
@@ -212,11 +217,9 @@ def alone(advance: Callable, read: Callable, channels: int, wrap: Callable) -> S
             except ArithmeticError:
                 continue  # functions such as math.exp refuse what numpy calls inf
             except NumbaError as error:
-                lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
-                reason = next((line for line in lines if "Failed in" not in line), lines[0])
                 raise ValueError(
-                    f"rate, readings or thresholds cannot be compiled by numba ({reason}): let them use "
-                    "numbers, numpy and functions under numba.njit only, or choose mode='python'"
+                    f"rate, readings or thresholds cannot be compiled by numba ({_reason(error)}): let "
+                    "them use numbers, numpy and functions under numba.njit, or choose mode='python'"
                 ) from error
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
 
@@ -236,11 +239,11 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     """
     if mode not in ("compiled", "python"):
         raise ValueError(f"mode '{mode}' is none of compiled, python: choose one of them")
-    own: Callable = compiled if mode == "compiled" else lambda function: function
-    rate, read, thresholds = (own(records.flat(own(f), results, own)) for f, results in functions)
+    used = compiled if mode == "compiled" else lambda function: function
+    rate, read, thresholds = (records.flat(used(f), results) for f, results in functions)
     channels, count = functions[1][1], functions[2][1]
-    advance = advancing(rate, thresholds, count, own)
-    return alone(advance, read, channels, own)
+    advance = advancing(rate, thresholds, count)
+    return alone(advance, read, channels, compile_it=mode == "compiled")
 
 
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:

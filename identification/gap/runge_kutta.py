@@ -8,13 +8,28 @@ a threshold push back slides along it, to first order, and exactly where it stic
 from collections.abc import Callable
 
 import numpy as np
+from numba.extending import register_jitable
+
+_registered = register_jitable(error_model="numpy", no_cfunc_wrapper=True)
 
 SHORTEST_STEP = 1e-8
 """Sub-step at which a threshold is passed, relative to the ordinary sub-step [1]: a threshold is located
 to this accuracy, well above rounding."""
 
 
-def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) -> Callable:
+def compiled(function: Callable) -> Callable:
+    """The function, which compiled ones may call, too; divisions by zero then give inf, as in numpy."""
+    return function if hasattr(function, "py_func") else _registered(function)
+
+
+@compiled
+def copy(source, target):
+    """Copy (n,) numbers. numba compiles `target[:] = source` with sentences for shapes that differ."""
+    for i in range(len(target)):
+        target[i] = source[i]
+
+
+def advancing(rate: Callable, thresholds: Callable, count: int) -> Callable:
     """A function (x, t, h, u, p, push, work) that advances one candidate's states x (states,) by h [s].
 
     push: forcing of the rates, (states,). work: scratch, (6, states):
@@ -24,16 +39,15 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
         rate: derivatives of the states, as `Records.flat` makes it.
         thresholds: functions whose change of sign marks a threshold, likewise.
         count: number of thresholds.
-        wrap: compiles a function, or leaves it as it is.
     """
 
-    @wrap
+    @compiled
     def slope(x, t, u, p, push, out):
         rate(x, t, u, p, out)
         for i in range(len(x)):
             out[i] += push[i]
 
-    @wrap
+    @compiled
     def passed(x, t, u, p, before, level):
         """Index of a threshold that lies between x and where `before` was taken; -1 for none."""
         if count > 0:
@@ -43,7 +57,7 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
                     return i
         return -1
 
-    @wrap
+    @compiled
     def try_step(x, t, h, u, p, push, before, level, work):
         """A step into work[5]; returns whether no stage has passed a threshold."""
         slope(x, t, u, p, push, work[0])
@@ -59,7 +73,7 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
             work[5, i] = x[i] + h / 6.0 * inner
         return passed(work[5], t + h, u, p, before, level) < 0
 
-    @wrap
+    @compiled
     def pass_threshold(x, t, tiny, left, u, p, push, before, level, work):
         """Pass a threshold by a tiny step, or stay on it where both sides push back (Filippov)."""
         slope(x, t, u, p, push, work[0])
@@ -74,10 +88,10 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
                 share = (new - old) / ((new - old) - (level[i] - new))
                 x += left * (work[0] + share * (work[1] - work[0]))
                 return True
-        x[:] = work[4]
+        copy(work[4], x)
         return False
 
-    @wrap
+    @compiled
     def advance_past_thresholds(x, t, h, u, p, push, work):
         tiny, left, size = SHORTEST_STEP * h, h, h
         before, level = np.empty(count), np.empty(count)
@@ -90,7 +104,7 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
         for _ in range(600):  # in which ten crossings find room
             size = min(size, left)
             if try_step(x, t, size, u, p, push, before, level, work):
-                x[:] = work[5]
+                copy(work[5], x)
                 t, left = t + size, left - size
             elif size > tiny:
                 size = max(size / 8.0, tiny)
@@ -104,12 +118,12 @@ def advancing(rate: Callable, thresholds: Callable, count: int, wrap: Callable) 
                 return
             thresholds(x, t, u, p, before)
 
-    @wrap
+    @compiled
     def advance(x, t, h, u, p, push, work):
         if count > 0:
             advance_past_thresholds(x, t, h, u, p, push, work)
         else:
             try_step(x, t, h, u, p, push, push, push, work)
-            x[:] = work[5]
+            copy(work[5], x)
 
     return advance
