@@ -58,9 +58,11 @@ class OneValve:
 
     Its memory of a valve is a record, whose zeros mean that an episode begins. The compiled function
     `decide(memory, observation, constants, period)` of its file changes memory and observation
-    (entries,), and gives 1 (coil on) or 0. C is translated from what it calls.
+    (entries,), and gives 1 (coil on) or 0. C is translated from what it calls, and an accelerator
+    compiles it, too.
     """
 
+    decide: ClassVar[Any]
     decide_all: ClassVar[Any]
     """`decide` over a batch: (memory, observations, constants, period, actions). Each file has its own
     loop: numba keeps none on disk that is handed the function to call."""
@@ -90,3 +92,8 @@ class OneValve:
 def in_unit(observation, i):
     """Entry i of an observation (entries,) in its unit."""
     return observation[i] * SCALE[i] + CENTRE[i]
+
+
+def decides_on_device(controller: Controller) -> bool:
+    """Whether an accelerator can run the controller's decisions beside the plant."""
+    return isinstance(controller, OneValve) and not isinstance(controller, Privileged)

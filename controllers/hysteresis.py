@@ -75,7 +75,7 @@ class Hysteresis(OneValve):
     """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
-    decide_all = _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), _loop(DIGEST)
     record = np.dtype((np.record, [("off", np.float64)]))
 
     def __post_init__(self) -> None:
@@ -93,8 +93,8 @@ class Hysteresis(OneValve):
 
 
 _THRESHOLDS = {
-    "open_below": Range(low=-0.45, high=0.3, least=-0.5, most=0.5),
-    "shut_above": Range(low=-0.45, high=0.45, least=-0.5, most=0.5),
+    "open_below": Range(low=-0.45, high=0.3),
+    "shut_above": Range(low=-0.45, high=0.45),
 }
 
 HYSTERESIS = Registration(
@@ -111,8 +111,8 @@ EXTRAPOLATING_HYSTERESIS = Registration(
     build=lambda values, plant: Hysteresis(name="extrapolating hysteresis", **values),
     search_space={
         **_THRESHOLDS,
-        "open_lookahead": Range(low=0.0, high=0.15, most=0.5),
-        "shut_lookahead": Range(low=0.0, high=0.06, most=0.5),
+        "open_lookahead": Range(low=0.0, high=0.15),
+        "shut_lookahead": Range(low=0.0, high=0.06),
         "lag": Choice(values=P2_LAGS),
     },
 )

@@ -7,14 +7,14 @@ adaptive pulse (controllers/pulse.py). Two rules keep the coil on, whatever the 
    stood open would let p2 follow a refill of the supply far above the target.
 2. p2 might rise too far: if the valve opened early, p2 would pass the target by more than CEILING.
 
-Two shields turn what an ordinary episode shows into what no reading can change:
+Two shields in front of the policy turn what an ordinary episode shows into what no reading can change:
 
 3. p2 as read lies above the band: coil on. It stands in front of whatever decides, the controller that
    takes over where sensors fail included.
 4. p2 as read lies below the band, the supply is high and nothing is under way, since the coil is on and
    the control chamber full: coil off, unless a rule above says on. One period off cannot open the valve.
 
-A policy's file names the rules it was trained behind; the shields need no training.
+A policy's file names the rules it was trained behind. The shields take no part in a training.
 """
 
 from dataclasses import dataclass, field
@@ -27,10 +27,10 @@ from gymnasium.vector import AutoresetMode, VectorEnv, VectorWrapper
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, Controller, compiled, composed, in_unit
+from controllers.base import DIGEST, Controller, compiled, composed
 from controllers.pulse import follow, nominal_knowledge
 from controllers.valve_learner import LEARNT, LEAST_HEAD, VALVE
-from epv_env.observation import INDEX, LAYOUT
+from epv_env.observation import LAYOUT
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.primitives import generated
 from epv_env.reward import BAND_BAR
@@ -46,8 +46,6 @@ HIGH_HEAD, FULL = 1.0, 0.5
 HORIZON = 0.1
 """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
 
-
-_ERROR = INDEX["p2_error"]
 READINGS = len(LAYOUT)
 """Number of the readings, which come first."""
 _CENTRE, _SCALE, _LIMIT = (
@@ -76,6 +74,12 @@ def would_rise_too_far(v):
 
 
 @compiled
+def keeps_on(v):
+    """Whether a rule keeps the coil on."""
+    return cannot_raise(v) or would_rise_too_far(v)
+
+
+@compiled
 def above_band(error):
     """Shield 3: whether p2 - target as read [bar] lies above the band."""
     return error >= BAND_BAR
@@ -90,7 +94,7 @@ def below_band(v, error):
 @compiled
 def forced(v, error):
     """What rules and shields force for p2 - target as read [bar]: 1 coil on, -1 coil off, 0 nothing."""
-    if cannot_raise(v) or would_rise_too_far(v) or above_band(error):
+    if keeps_on(v) or above_band(error):
         return 1.0
     return -1.0 if below_band(v, error) else 0.0
 
@@ -109,22 +113,22 @@ show_learnt: Any = generated(
 def describe(v, observation, c, period, inputs):
     """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
 
-    c: a Knowledge. Returns what rules and shields force.
+    c: a Knowledge.
     """
     follow(v, observation, c, period)
     for i in range(READINGS):
         inputs[i] = observation[i]
     show_learnt(v, inputs)
-    return forced(v, in_unit(observation, _ERROR))
 
 
 def _loop(digest: str) -> Any:
     @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def describe_all(valves, observations, c, period, inputs, forces):
+    def describe_all(valves, observations, c, period, inputs, kept_on):
         if digest == "":
             return
         for i in range(len(valves)):
-            forces[i] = describe(valves[i], observations[i], c, period, inputs[i])
+            describe(valves[i], observations[i], c, period, inputs[i])
+            kept_on[i] = keeps_on(valves[i])
 
     return describe_all
 
@@ -144,7 +148,7 @@ class ValveKnowledge:
         """Forget the valves; n episodes begin."""
         self.valves = np.zeros(n, VALVE)
         """What is known of each valve, records (n,)."""
-        self._forces = np.zeros(n)
+        self._kept_on = np.zeros(n, dtype=bool)
 
     def forget(self, who: NDArray) -> None:
         """Forget the valves of these episodes, indices (m,): others begin in their place."""
@@ -152,23 +156,23 @@ class ValveKnowledge:
 
     def observe(self, observations: NDArray) -> NDArray:
         """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
-        return self._described(self.valves, observations, self._forces)
+        return self._described(self.valves, observations, self._kept_on)
 
     def overruled(self, actions: NDArray) -> NDArray:
-        """Actions (n,) as rules and shields leave them, for the observations taken in last."""
-        return np.where(self._forces > 0, 1, np.where(self._forces < 0, 0, actions))
+        """Actions (n,) as the rules leave them, for the observations taken in last."""
+        return np.where(self._kept_on, 1, actions)
 
     def last(self, who: NDArray, observations: NDArray) -> NDArray:
         """What `observe` gives for the last observations (m, entries) of episodes `who` (m,) that end;
         their valves are forgotten."""
         ending = self.valves[who]
         self.forget(who)
-        return self._described(ending, observations, np.zeros(len(who)))
+        return self._described(ending, observations, np.zeros(len(who), dtype=bool))
 
-    def _described(self, valves: NDArray, observations: NDArray, forces: NDArray) -> NDArray:
+    def _described(self, valves: NDArray, observations: NDArray, kept_on: NDArray) -> NDArray:
         inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
         seen = np.ascontiguousarray(observations, dtype=np.float32)
-        _describe_all(valves, seen, self._constants, self._period, inputs, forces)
+        _describe_all(valves, seen, self._constants, self._period, inputs, kept_on)
         return inputs
 
 
@@ -183,7 +187,7 @@ class LearntObservation(VectorWrapper):
         Args:
             env: n valves of EPValve-v0, in any autoreset mode.
             plant: the nominal plant that the learner starts from; None: the environment's.
-            rules: whether rules and shields overrule the actions.
+            rules: whether the rules overrule the actions.
         """
         super().__init__(env)
         own: Any = env.unwrapped
@@ -233,7 +237,7 @@ WITH_RULES = " with rules"
 
 @dataclass(kw_only=True)
 class WithRules:
-    """A controller of the on/off environment behind rules and shields."""
+    """A controller of the on/off environment behind the rules."""
 
     main: Controller
     """Decides where no rule does."""

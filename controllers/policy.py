@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from controllers.base import DIGEST, OneValve, composed, in_unit
 from controllers.hysteresis import Hysteresis, Thresholds
-from controllers.knowledge import READINGS, above_band, describe
+from controllers.knowledge import READINGS, above_band, describe, forced
 from controllers.network import Network, Weights, forward
 from controllers.policy_files import read_policy
 from controllers.pulse import Knowledge, nominal_knowledge
@@ -47,10 +47,12 @@ class Parts(NamedTuple):
 def decide(m, observation, c, period):
     """One valve's decision (controllers.base.OneValve). c: Parts."""
     checked(m.senses, observation, c.ends, c.fallback, period)
-    force = describe(m.valve, observation, c.knowledge, period, m.inputs)
+    describe(m.valve, observation, c.knowledge, period, m.inputs)
+    error = in_unit(observation, _ERROR)
+    force = forced(m.valve, error)
     forward(c.weights, m.inputs, m.signals)
     off = force < 0 or (force == 0 and m.signals[0, 0] >= m.signals[0, 1])
-    if above_band(in_unit(observation, _ERROR)):  # this shield holds for the fall-back, too
+    if above_band(error):  # this shield holds for the fall-back, too
         return 1.0
     return overruled(m.senses, 0.0 if off else 1.0)
 
@@ -77,7 +79,7 @@ class Policy(OneValve):
     """[s]"""
     name: str = "PPO"
     environment: str = "EPValve-v0"
-    decide_all = _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), _loop(DIGEST)
 
     def __post_init__(self) -> None:
         fallback = tuned(FALLBACK, self.plant)

@@ -69,7 +69,7 @@ def plan(v: Any, table: Any, t: int, p: Any, period: float) -> None:
         v.advised = 0.0 if fed and v.opens_in > 0 and v.margin < 0 else 1.0
         return
     by_gain = p.doubt * v.gain_deviation * v.under_way / v.gain
-    uncertain = np.sqrt((p.caution * v.offset_deviation) ** 2 + by_gain**2)
+    uncertain = math.sqrt((p.caution * v.offset_deviation) ** 2 + by_gain**2)
     asked = (p.aim + v.reserve - uncertain - v.error) / v.gain
     slope = v.fall / (v.gain * v.pace)
     v.remaining = duration(table, t, v.offset, v.p1, v.p2, v.p3, asked, slope) / v.pace
@@ -125,7 +125,7 @@ def _loop(digest: str) -> Any:
 class _Pulse(OneValve):
     """Acts as `plan` advises."""
 
-    decide_all = _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), _loop(DIGEST)
     record = VALVE
 
 
@@ -200,13 +200,13 @@ ADAPTIVE_PULSE = Registration(
     controller=AdaptivePulse,
     build=_adaptive,
     search_space={
-        "trigger": Range(low=-0.3, high=0.1, least=-0.5, most=0.5),
-        "aim": Range(low=-0.1, high=0.3, least=-0.5, most=0.5),
-        "caution": Range(low=0.0, high=0.6, most=2.0),
-        "doubt": Range(low=0.0, high=1.5, most=4.0),
-        "filter_time": Range(low=0.004, high=0.04, log=True, least=0.001, most=0.4),
-        "look_ahead": Range(low=0.3, high=1.5, least=0.0, most=4.0),
-        "rounding": Range(low=0.2, high=1.2, least=0.0, most=2.0),
+        "trigger": Range(low=-0.3, high=0.1),
+        "aim": Range(low=-0.1, high=0.3),
+        "caution": Range(low=0.0, high=0.6),
+        "doubt": Range(low=0.0, high=1.5),
+        "filter_time": Range(low=0.004, high=0.04, log=True),
+        "look_ahead": Range(low=0.3, high=1.5),
+        "rounding": Range(low=0.2, high=1.2),
     },
 )
 

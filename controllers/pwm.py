@@ -94,13 +94,13 @@ REGISTRATION = Registration(
     controller=PWM,
     build=build,
     search_space={
-        "inner_time": Range(low=0.01, high=0.06, log=True, least=0.005, most=0.2),
-        "phase_margin": Range(low=20.0, high=60.0, least=5.0, most=80.0),
-        "integral_time": Range(low=0.2, high=3.0, log=True, least=0.02, most=30.0),
-        "depth": Range(low=0.03, high=0.8, log=True, least=0.01, most=5.0),
-        "setpoint": Range(low=-0.3, high=0.2, least=-0.5, most=0.5),
-        "engage_below": Range(low=-0.4, high=0.3, least=-0.5, most=0.5),
-        "rest_above": Range(low=-0.3, high=0.4, least=-0.5, most=0.5),
+        "inner_time": Range(low=0.005, high=0.06, log=True),
+        "phase_margin": Range(low=20.0, high=60.0),
+        "integral_time": Range(low=0.2, high=3.0, log=True),
+        "depth": Range(low=0.03, high=0.8, log=True),
+        "setpoint": Range(low=-0.3, high=0.2),
+        "engage_below": Range(low=-0.4, high=0.3),
+        "rest_above": Range(low=-0.3, high=0.4),
     },
     tuned_on="exact",  # within ±10 % no tuning holds the band, and the search finds nothing useful
 )

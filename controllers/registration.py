@@ -3,16 +3,12 @@
 The record stands beside the class, in the controller's own file. controllers/registry.py lists it.
 """
 
-import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 from controllers.base import Controller
 from epv_env.plant.plantfile import Plant
-
-NEAR_BOUND = 0.02
-"""Share of a range next to its ends where a search's outcome counts as cut off by the bound [1]."""
 
 
 class RegistrationError(ValueError):
@@ -29,38 +25,13 @@ class Range:
     """Upper end, in the unit of the quantity."""
     log: bool = False
     """Whether the search draws it uniformly in its logarithm."""
-    least: float | None = None
-    """Physical limit down to which a search may be widened; None: `low` is the limit."""
-    most: float | None = None
-    """Physical limit up to which a search may be widened; None: `high` is the limit."""
-
-    @property
-    def limits(self) -> tuple[float, float]:
-        """Least and greatest value that has a meaning."""
-        least = self.low if self.least is None else self.least
-        return least, self.high if self.most is None else self.most
 
     def __str__(self) -> str:
-        return "a number from {:g} to {:g}".format(*self.limits)
+        return f"a number from {self.low:g} to {self.high:g}"
 
     def holds(self, value: float) -> bool:
-        """Whether a value lies within the limits."""
-        return self.limits[0] <= value <= self.limits[1]
-
-    def widened(self, value: float) -> "Range":
-        """The range for another search, if one ended at `value`; itself if that is not at a bound.
-
-        A bound with less than NEAR_BOUND of the range between it and the value moves outwards by the
-        range's own length (in the logarithm if `log`), at most to the physical limit.
-        """
-        to, back = (math.log, math.exp) if self.log else (float, float)
-        low, high, at = to(self.low), to(self.high), to(value)
-        length, (least, most) = high - low, self.limits
-        if at - low < NEAR_BOUND * length:
-            return replace(self, low=max(back(low - length), least))
-        if high - at < NEAR_BOUND * length:
-            return replace(self, high=min(back(high + length), most))
-        return self
+        """Whether a value lies within."""
+        return self.low <= value <= self.high
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -105,7 +76,7 @@ class Registration:
             plant: that it is designed for: parameters and voltage of the coil.
 
         Raises:
-            RegistrationError: a quantity is missing, unknown or beyond its limits.
+            RegistrationError: a quantity is missing, unknown or outside its range.
             ValueError: the quantities contradict each other.
         """
         expected = set(self.search_space or {})
@@ -120,7 +91,7 @@ class Registration:
         for name, quantity in (self.search_space or {}).items():
             if not quantity.holds(values[name]):
                 raise RegistrationError(
-                    f"controller {self.kind!r}: {name} = {values[name]} has no meaning: give "
+                    f"controller {self.kind!r}: {name} = {values[name]} is not allowed: give "
                     f"{quantity}, or tune anew with `epv tune --only {self.kind!r}`"
                 )
         return self.build(values, plant)

@@ -1,6 +1,6 @@
 """The tuned controllers as data (tuned.json): the values that the search found, and how it searched."""
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -34,8 +34,6 @@ class Tuning:
     """Episodes of one evaluation."""
     plants: str = "sensitive_ten_percent"
     """Region of the plants that it was searched on (epv_env.plant.region)."""
-    widened: dict[str, tuple[float, float]] = field(default_factory=dict)
-    """Ranges that ended at a bound and were searched again, by quantity: the last range searched."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -95,8 +93,3 @@ def tuned(name: str, plant: Plant | None = None) -> Controller:
     """`build` with the tuning that comes with the package; plant None: the report's calibration."""
     values = load_tunings()[name.removesuffix(WITH_RULES)].values
     return build(name, values, plant or Plant.calibrated())
-
-
-def tuned_controllers(plant: Plant | None = None) -> list[Controller]:
-    """The classic controllers as tuned, designed for a plant (None: the report's calibration)."""
-    return [tuned(name, plant) for name in load_tunings()]

@@ -89,20 +89,25 @@ class PWM:
         return on_time, duty
 
 
-def check_unmasked(actions: Any) -> None:
+def _check_unmasked(actions: Any) -> None:
     """Raises ActionError for a mask: NumPy would drop it, and keep what is under it."""
     parts = actions if isinstance(actions, (list, tuple)) else [actions]
     if any(map(np.ma.isMaskedArray, parts)):
         raise ActionError(f"actions {shown(actions)}: give one number for each valve, no mask")
 
 
+def as_array(actions: Any) -> NDArray:
+    """Actions as an array, one without entries where their lengths differ. Raises ActionError."""
+    _check_unmasked(actions)
+    try:
+        return np.asarray(actions)
+    except ValueError:  # of several lengths
+        return np.empty(0, dtype=object)
+
+
 def _numbers(actions: Any) -> NDArray:
     """Actions (n,) or (n, 1) of any real type as float64, (n,). Raises ActionError."""
-    check_unmasked(actions)
-    try:
-        array = np.asarray(actions)
-    except ValueError:  # of several lengths
-        array = np.empty(0, dtype=object)
+    array = as_array(actions)
     if not (array.dtype.kind in "biuf" and array.ndim in (1, 2) and array.size == len(array)):
         raise ActionError(f"actions {shown(actions)}: give one number for each valve")
     return array.astype(np.float64).reshape(len(array))

@@ -19,9 +19,8 @@ from epv_env.task import LimitingTask
 
 BATCH = (
     "num_envs", "max_episode_steps", "autoreset_mode", "threads", "device", "to_host", "starts",
-    "precision",
 )  # fmt: skip
-"""What a batch takes beside the arguments of one environment; the last four: `make_vector`."""
+"""What a batch takes beside the arguments of one environment; the last three: `make_vector`."""
 
 
 def masked_info(result: StepResult, valid: NDArray) -> dict[str, Any]:
@@ -65,6 +64,8 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
 
     metadata: dict[str, Any] = {"render_modes": [], "autoreset_mode": AutoresetMode.NEXT_STEP}  # noqa: RUF012
     action_form: ClassVar[type[OnOff] | type[PWM]]
+    most_envs: ClassVar[int] = 1_000_000
+    """More are a slip, and would fill the memory."""
 
     def __init__(
         self,
@@ -79,7 +80,7 @@ class _ValveVectorEnv(gymnasium.vector.VectorEnv):
         render_mode: str | None = None,
         **options: Any,
     ):
-        check_count("num_envs", num_envs, most=1_000_000)  # more are a slip, and would fill the memory
+        check_count("num_envs", num_envs, most=self.most_envs)
         if threads is not None:
             check_count("threads", threads)
         if render_mode is not None:

@@ -1,11 +1,7 @@
-"""What the 2003 report defines and prints: test cases, output error, printed tables."""
+"""What the 2003 report defines: test cases and output error."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cache
-from importlib import resources
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -84,30 +80,3 @@ def partial_error(errors: Sequence[NDArray]) -> NDArray:
 def total_error(partial_errors: Sequence[NDArray]) -> NDArray:
     """Root mean square of the tests' partial errors, fractions () or (n,) each (eq. 21)."""
     return np.sqrt(np.mean(np.square(partial_errors), axis=0))
-
-
-@cache
-def _data() -> dict[str, Any]:
-    path = resources.files("identification").joinpath("printed_2003.json")
-    return json.loads(path.read_text(encoding="utf-8"))
-
-
-def correlation_matrix() -> list[list[float]]:
-    """Table 4, rows and columns in the order I, U, p1, p2, p3."""
-    return _data()["table4"]["matrix"]
-
-
-def printed_sensitivities(*tables: int) -> dict[str, tuple[float, float]]:
-    """Tables 8 and 9, or one of them: total errors for -10 % and +10 % by symbol [%]."""
-    rows = [row for table in tables or (8, 9) for row in _data()[f"table{table}"].items()]
-    return {symbol: (minus, plus) for symbol, (minus, plus) in rows}
-
-
-def printed_errors(table: int) -> dict[str, dict[str, float]]:
-    """Table 11, 13 or 15: by test, the errors of p2, p3 and I and the partial error [%]."""
-    return _data()[f"table{table}"]["tests"]
-
-
-def printed_total(table: int) -> float:
-    """Table 11's or 13's total error [%]."""
-    return _data()[f"table{table}"]["total"]

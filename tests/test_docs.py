@@ -20,7 +20,6 @@ pytestmark = pytest.mark.training
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
 from docs.scripts import notebook  # noqa: E402
-from docs.scripts.effects_table import effects_table  # noqa: E402
 from epv_env.common.commands import commands  # noqa: E402
 from epv_env.common.options import parse  # noqa: E402
 from epv_env.plant.plantfile import load_plant  # noqa: E402
@@ -215,6 +214,9 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert done.returncode == 0, done.stderr
     assert (tmp_path / "site/reference/api/epv_env.plant.html").is_file()
     assert "<code>epv sweep</code>" in (tmp_path / "site/reference/command-lines.html").read_text()
+    assert (
+        "<td><code>eddy_current</code></td>" in (tmp_path / "site/explanation/effects.html").read_text()
+    )
     pages = "".join(path.read_text() for path in (tmp_path / "site").glob("*.html"))
     assert not re.search(r"<(script|link|img)[^>]+(src|href)=\"?https?:", pages)
     assert '<script src="assets/iframe-worker.js"' in pages  # the search works from the disk
@@ -247,8 +249,3 @@ def test_how_good_it_is_stands_behind_each_row():
         behind = ((ROOT / page).parent / link).read_text(encoding="utf-8")
         for figure in re.findall(r"(?<![\d\w])\d[\d.]*(?<!\.)", answer):
             assert re.search(rf"(?<![\d.]){re.escape(figure)}(?![\d])", behind), f"{figure}: {link}"
-
-
-def test_the_table_of_effects_is_that_of_the_records():
-    """Written by `python docs/scripts/effects_table.py`."""
-    assert effects_table() in text("docs/explanation/effects.md")

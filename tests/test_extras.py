@@ -41,14 +41,13 @@ PROMISES = {
     + readme(1)
     + readme(2),
     "render": readme(0) + modules("epv_env.render"),
-    "control": "from controllers.tuned import tuned_controllers as t; assert len(t()) > 3",
+    "control": "from controllers.tuned import tuned; tuned('PWM')",
     "training": modules("training"),
     "identification": modules("identification") + "import tqdm, jinja2",  # imported late
     "bench-files": modules("identification.importing", "identification.commands.import_")
     + "import asammdf, h5py, nptdms, pint, pyarrow, pymatreader",
     "video": "import epv_env, gymnasium as g\ne = g.make('EPValve-v0', render_mode='rgb_array')\n"
     "e.reset(); assert e.render().shape == (720, 1280, 3)",
-    "research": "from docs.examples.research import cleanrl_style, sb3_contrib, torchrl_ppo",
     "docs": "import material, mkdocs, mkdocstrings\nfrom docs.scripts import hooks, unit_brackets\n"
     "for write in hooks.GENERATED.values(): write()",
 }
@@ -96,9 +95,7 @@ sys.meta_path = [Brought if finder is PathFinder else finder for finder in sys.m
 """
 
 
-@pytest.mark.parametrize(
-    "extra", [pytest.param(x, marks=pytest.mark.slow) if x == "research" else x for x in PROMISES]
-)
+@pytest.mark.parametrize("extra", PROMISES)
 def test_an_extra_alone_brings_what_it_promises(extra, tmp_path):
     code = blocker(*filter(None, [extra])) + PROMISES[extra]
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "SDL_VIDEODRIVER": "dummy"}

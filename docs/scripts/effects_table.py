@@ -1,22 +1,12 @@
-"""The table of effects in docs/explanation/effects.md, from the effects' records.
+"""The table of effects that the site shows, from the effects' records.
 
-    python -m docs.scripts.effects_table
-
-writes the part between the page's markers.
+python -m docs.scripts.effects_table      # prints it
 """
 
-import sys
-from pathlib import Path
-
-from docs.studies.common import fill
 from docs.studies.common import table as markdown_table
-from epv_env.common.command_line import fail_clearly
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
-
-PAGE = Path(__file__).parents[1] / "explanation" / "effects.md"
-PART = "effects"
 
 
 def effects_table() -> str:
@@ -41,11 +31,5 @@ def _size(size: Size) -> str:
     return f"`{size.symbol}` {low:g} to {high:g}{unit}"
 
 
-def main() -> int:
-    """Write the table into the page."""
-    fill(PAGE, {PART: effects_table()})
-    return 0
-
-
 if __name__ == "__main__":
-    sys.exit(fail_clearly(main))
+    print(effects_table())

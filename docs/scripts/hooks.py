@@ -12,7 +12,7 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from docs.scripts import command_lines, notebook
+from docs.scripts import command_lines, effects_table, notebook
 
 ROOT = Path(__file__).parents[2]
 """The repository's root."""
@@ -27,6 +27,7 @@ FOLDER_OPTIONS = """    options:
 """Show a folder's docstring only; its modules follow."""
 GENERATED = {
     "<!-- generated: command lines -->": command_lines.page,
+    "<!-- generated: effects -->": effects_table.effects_table,
     "<!-- generated: notebook -->": notebook.page,
 }
 """Lines of pages, and what writes the text that replaces them."""
@@ -51,7 +52,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Write the list of command lines and the notebook where a page asks for them."""
+    """Write what a page asks for."""
     for line, write in GENERATED.items():
         if line in markdown:
             markdown = markdown.replace(line, write())

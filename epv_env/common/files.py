@@ -221,9 +221,9 @@ JOURNAL = "epv-journal/2"
 """Form of a journal; one of another form starts anew."""
 
 
-def _checksum(name: str, result: Any) -> int:
-    """Of a line of a journal: what is read back is what was added."""
-    return zlib.crc32(json.dumps([name, result]).encode())
+def _checksum(name: str, result: str) -> int:
+    """Of a line of a journal, name and result as JSON: what is read back is what was added."""
+    return zlib.crc32(f"[{name}, {result}]".encode())
 
 
 class Journal:
@@ -251,7 +251,7 @@ class Journal:
         try:
             entry = json.loads(line)
             name, result = entry["name"], entry["result"]
-            if isinstance(name, str) and entry["check"] == _checksum(name, result):
+            if isinstance(name, str) and entry["check"] == _checksum(*map(json.dumps, (name, result))):
                 return name, result
         except (ValueError, KeyError, TypeError, RecursionError):
             pass
@@ -281,6 +281,7 @@ class Journal:
     def add(self, name: str, result: Any) -> None:
         """Keep a result, JSON-ready; it is on the disk when this returns."""
         with _named(self.path), self.path.open("a", encoding="utf-8") as stream:
-            line = {"name": name, "result": result, "check": _checksum(name, result)}
-            stream.write(json.dumps(line) + "\n")
+            own, text = json.dumps(name), json.dumps(result)
+            check = _checksum(own, text)
+            stream.write(f'{{"name": {own}, "result": {text}, "check": {check}}}\n')
         self._found[name] = result

@@ -135,8 +135,9 @@ Folder = Annotated[Path, writable_folder, "folder of results"]
 """A folder that exists or can be made."""
 PlantFile = Annotated[Path | None, {"metavar": "FILE"}, "plant file (default: the report's calibration)"]
 Names = Annotated[Sequence[str], {"nargs": "+", "metavar": "NAME"}]
-Device = Annotated[str, {"choices": ("cpu", "cuda")}]
-"""Help: what runs on the processor, or on an NVIDIA accelerator (extra gpu)."""
+Device = Annotated[
+    str, {"choices": ("cpu", "cuda")}, "for the episodes: cuda is an NVIDIA accelerator (extra gpu)"
+]
 Quick = Annotated[bool, "a short run that shows that all works"]
 
 
@@ -148,4 +149,4 @@ class Episodes:
     seed: Annotated[Seed, "of the first episode, within its range"] = 0
     plant: PlantFile = None
     workers: Annotated[int | None, Number(int, 1, 1024), "processes (default: all cores)"] = None
-    device: Annotated[Device, "of the plants: cuda is an NVIDIA accelerator (extra gpu)"] = "cpu"
+    device: Device = "cpu"

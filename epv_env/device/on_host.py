@@ -31,14 +31,3 @@ class OnHost(VectorWrapper):
         if self.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP and np.any(ended):
             keep_final(infos, shown["final_obs"].copy_to_host(), ended)
         return observation, reward, terminated, truncated, infos
-
-    def advance(self, actions: Any) -> StepResult:
-        """One control period of every valve (n,) without autoreset, whether its episode ended or not."""
-        observation, *_, shown = self.env.step(actions)
-        return StepResult(observation.copy_to_host(), shown["figures"].copy_to_host())
-
-    @property
-    def coil_energy(self) -> NDArray:
-        """Electrical energy of each coil so far, (n,) [J]."""
-        env: Any = self.env
-        return env.coil_energy.copy_to_host()

@@ -1,6 +1,6 @@
 """EPValve-v0 and EPValvePWM-v0 as vector environments whose arrays stay on an NVIDIA accelerator."""
 
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 from gymnasium.utils.seeding import np_random
@@ -8,13 +8,10 @@ from gymnasium.vector import AutoresetMode
 from numba import cuda
 from numba.core import config
 
-from epv_env.actions import check_unmasked
+from epv_env.actions import ActionError, as_array
 from epv_env.common.extras import how_to_install
-from epv_env.device.kernels import THREADS, Batch, Results, restart, step_kernel
-from epv_env.observation import LAYOUT
+from epv_env.device import kernels
 from epv_env.period import rules_of
-from epv_env.plant.equations import State
-from epv_env.plant.lanes import N_INPUT, N_STATE
 from epv_env.result import N_FIGURE
 from epv_env.settings import checked_options
 from epv_env.signals import OptionError, check_count
@@ -23,10 +20,8 @@ from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv, _ValveVect
 SIMULATED = bool(getattr(config, "ENABLE_CUDASIM", False))
 """Whether numba's simulator stands for the device: its arrays are the host's."""
 
-UNLIMITED = 2**62
-"""Steps of an episode that nothing truncates."""
-
-_COIL_ENERGY = State._fields.index("coil_energy")
+LEGACY_STREAM = 1
+"""Numba's default stream, as DLPack numbers streams."""
 
 
 def check_available() -> None:
@@ -39,12 +34,13 @@ def check_available() -> None:
 
 
 class _DeviceVectorEnv(_ValveVectorEnv):
-    """n valves on an accelerator, by the functions of the CPU's environment.
+    """n valves on an accelerator; each step overwrites the arrays that the step before gave.
 
     Actions may be arrays of the device (anything with `__cuda_array_interface__`, such as torch's
-    tensors) or of the host. Observations (n, entries), rewards, terminated and truncated (n,) are arrays
-    of the device. torch reads them without a copy: `torch.as_tensor(observation, device="cuda")`. The
-    next step overwrites them. Infos are "figures", (N_FIGURE, n), whose rows epv_env/result.py names,
+    tensors) or of the host, of any real type; what computes them on another stream is waited for.
+    Observations (n, entries), rewards, terminated and truncated (n,) are arrays of the device, computed
+    on its default stream. torch reads them without a copy: `torch.as_tensor(x, device="cuda")`; clone
+    what shall outlast the step. Infos are "figures", (N_FIGURE, n), whose rows epv_env/result.py names,
     and "begun" (n,): an episode began instead of the step. SAME_STEP adds "final_obs" (n, entries),
     valid where an episode ended ("_final_obs").
 
@@ -59,6 +55,8 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         starts: number of different starts, at most num_envs.
     """
 
+    most_envs = 10_000_000
+
     def __init__(self, num_envs: int = 1, *, starts: int = 4096, **arguments: Any):
         check_available()
         check_count("starts", starts)
@@ -66,11 +64,10 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         super().__init__(num_envs, **arguments)
         if self.privileged:
             raise OptionError("on a device, privileged is False: its truths stay there")
-        limit = UNLIMITED if self.max_episode_steps is None else self.max_episode_steps
+        limit = 2**62 if self.max_episode_steps is None else self.max_episode_steps
         self._limits = cuda.to_device(np.full(num_envs, limit, dtype=np.int64))
         self._rules = cuda.to_device(rules_of(self.settings))
-        self._key = np.uint64(0)
-        self._results = _on_device(blank_results(num_envs))
+        self._asked = cuda.device_array(num_envs)
 
     def _on_host(self, num_envs: int) -> int:
         return min(num_envs, self._most_starts)
@@ -84,82 +81,73 @@ class _DeviceVectorEnv(_ValveVectorEnv):
             if each is not None:
                 self._rngs[i] = np_random(each)[0]
         self._begin(np.arange(self.task.n), options)
-        if any(self.task._signals):
-            raise OptionError(
-                "a device follows no recordings and moving targets: leave them out, or use the CPU"
-            )
-        self._key = self._rngs[0].integers(2**64, dtype=np.uint64)
-        memory = self.task.memory
-        self._starts = _on_device(Batch(*(memory[name] for name in Batch._fields)))
-        self._batch = Batch(*(_like(memory[name], self.num_envs) for name in Batch._fields))
-        self._with_effects = bool(np.any(memory["with_effects"]))
-        self._results.started.copy_to_device(np.zeros(self.num_envs, dtype=np.int64))
-        self._results.ended.copy_to_device(np.ones(self.num_envs, dtype=bool))
-        self._begin_ended(instead=True)
-        self._results.begun.copy_to_device(np.zeros(self.num_envs, dtype=bool))
+        starts = kernels.Batch.of(self.task)
+        self._with_effects = bool(np.any(starts.numbers[kernels.WITH_EFFECTS]))
+        self._starts = on_device(starts)
+        shapes = [(*each.shape[:-1], self.num_envs) for each in starts]
+        blanks = map(cuda.device_array, shapes, [each.dtype for each in starts])
+        self._batch = kernels.Batch(*blanks)
+        self._results = on_device(blank_results(self.num_envs))
+        self._launch(self._results.reward, kernels.INSTEAD)
         return self._results.observation, {}
 
     def step(self, actions: Any) -> tuple[Any, Any, Any, Any, dict[str, Any]]:
-        r, asked = self._results, _flat(actions, self.num_envs)
-        if self.autoreset_mode is AutoresetMode.NEXT_STEP:
-            self._begin_ended(instead=True)
-        for extended in (False, True)[: 1 + self._with_effects]:
-            kernel = step_kernel(self.action_form.rule, extended)
-            self._launch(kernel, self._batch, r, self._rules, asked, self.action.slots, self._key,
-                         self._limits, self.task.valves.step)  # fmt: skip
+        r = self._results
+        self._launch(self._taken_in(actions), list(AutoresetMode).index(self.autoreset_mode))
         infos = {"figures": r.figures, "begun": r.begun}
         if self.autoreset_mode is AutoresetMode.SAME_STEP:
-            self._begin_ended(instead=False)
             infos |= {"final_obs": r.final_observation, "_final_obs": r.ended}
         return r.observation, r.reward, r.terminated, r.truncated, infos
 
-    @property
-    def coil_energy(self) -> Any:
-        """Electrical energy of each coil so far, an array of the device (n,) [J]."""
-        return self._batch.state[_COIL_ENERGY]
+    def _launch(self, actions: Any, ending: int) -> None:
+        kernel = kernels.step_kernel(self.action_form.rule, self._with_effects)
+        kernels.launch(
+            kernel, self.num_envs, self._batch, self._starts, self._results, self._rules, actions,
+            self.action.slots, self._limits, ending,
+        )  # fmt: skip
 
-    def _begin_ended(self, *, instead: bool) -> None:
-        self._launch(restart, self._batch, self._starts, self._results, self._key, instead)
-
-    def _launch(self, kernel: Any, *arguments: Any) -> None:
-        threads = min(THREADS, self.num_envs)
-        kernel[-(-self.num_envs // threads), threads](*arguments)
-
-
-def _like(array: np.ndarray, n: int) -> Any:
-    """An array of the device for n valves; valves are the last axis."""
-    shape, kind = (*array.shape[:-1], n), cast(Any, array.dtype)
-    return cuda.device_array(shape, dtype=kind)
-
-
-def _on_device(arrays: Any) -> Any:
-    """A named tuple of the device's arrays for one of NumPy's."""
-    return type(arrays)(*map(cuda.to_device, arrays))
+    def _taken_in(self, actions: Any) -> Any:
+        """Actions as a contiguous array of float64 of the device, (n,). Raises ActionError."""
+        array = _array_of(actions)
+        if array.shape not in ((self.num_envs,), (self.num_envs, 1)) or array.dtype.kind not in "biuf":
+            raise ActionError(
+                f"actions of shape {array.shape} and type {array.dtype}: give a real number for each of "
+                f"{self.num_envs} valves, bfloat16 as float32"
+            )
+        column = array if array.ndim == 1 else array[:, 0]
+        if isinstance(column, np.ndarray):
+            column = cuda.to_device(column.astype(float))
+        kernels.launch(kernels.copy_actions, self.num_envs, column, self._asked)
+        return self._asked
 
 
-def blank_results(n: int) -> Results:
-    """Zeros for n valves, NumPy's arrays."""
-    entries = len(LAYOUT)
-    shapes = {
-        "observation": (n, entries), "final_observation": (n, entries), "figures": (N_FIGURE, n),
-        "noise": (n, 1, 4), "before": (N_STATE, n), "inputs": (4, N_INPUT, n), "duration": (4, n),
-    }  # fmt: skip
-    kinds = {"observation": np.float32, "final_observation": np.float32, "started": np.int64}
-    kinds |= dict.fromkeys(("terminated", "truncated", "ended", "begun"), np.bool_)
-    return Results(*(
-        np.zeros(shapes.get(name, (n,)), dtype=kinds.get(name, np.float64))
-        for name in Results._fields
-    ))  # fmt: skip
+def _array_of(actions: Any) -> Any:
+    """Actions as an array of NumPy or of the device. Raises ActionError."""
+    if getattr(actions, "requires_grad", False):
+        raise ActionError("actions require a gradient: give actions.detach()")
+    if SIMULATED or not hasattr(actions, "__cuda_array_interface__"):
+        return as_array(actions)
+    if hasattr(actions, "__dlpack__"):  # makes the device wait for what computes them
+        actions.__dlpack__(stream=LEGACY_STREAM)
+    return cuda.as_cuda_array(actions)
 
 
-def _flat(actions: Any, n: int) -> Any:
-    """Actions as an array of the device, (n,). Raises ActionError or OptionError."""
-    check_unmasked(actions)
-    on_device = hasattr(actions, "__cuda_array_interface__") and not SIMULATED
-    array = cuda.as_cuda_array(actions) if on_device else cuda.to_device(np.ascontiguousarray(actions))
-    if array.size != n:
-        raise OptionError(f"got {array.size} actions for {n} valves: give one each")
-    return array.reshape(n)
+def on_device(value: Any) -> Any:
+    """NumPy's arrays in named tuples of any depth as the device's; numbers stay what they are."""
+    if isinstance(value, tuple):
+        return type(value)(*map(on_device, value))
+    return cuda.to_device(value) if isinstance(value, np.ndarray) else value
+
+
+def blank_results(n: int) -> kernels.Results:
+    """Of n valves whose episodes are to begin: NumPy's arrays, zeros."""
+    wide = (n, kernels.ENTRIES)
+    numbers, bools = (lambda: np.zeros(n)), (lambda: np.zeros(n, dtype=bool))
+    return kernels.Results(
+        observation=np.zeros(wide, np.float32), final_observation=np.zeros(wide, np.float32),
+        reward=numbers(), terminated=bools(), truncated=bools(), ended=~bools(), begun=bools(),
+        started=np.zeros(n, np.int64), figures=np.zeros((N_FIGURE, n)),
+    )  # fmt: skip
 
 
 class EPValveDeviceVectorEnv(_DeviceVectorEnv, EPValveVectorEnv):

@@ -204,24 +204,6 @@ def _mean_flows(progress: NDArray, time: NDArray, period: float) -> NDArray:
     return flows
 
 
-@numba.njit(cache=True)
-def totals(progress: NDArray, times: NDArray) -> NDArray:
-    """Air taken since the start of each episode, (n, times) [kg]; at most once through its sequence.
-
-    progress: (n,) of PROGRESS, which is not read on. times: increasing [s].
-    """
-    taken = np.zeros((len(progress), len(times)))
-    for i in range(len(progress)):
-        p = progress[i]
-        for k, time in enumerate(times):
-            taken[i, k] = p.leak * time
-            for application in p.applications:
-                if application[0] >= time:
-                    break
-                taken[i, k] += _passed(application, 0.0, time)
-    return taken
-
-
 class Profiles:
     """The consumption of n episodes, read forward in time."""
 

@@ -13,15 +13,15 @@ from typing import NamedTuple
 from epv_env.plant.effects.chambers import chamber_rates, pipe_rate
 from epv_env.plant.effects.coil import coil_current, flux_rate, heated, heating_rate
 from epv_env.plant.effects.flows import discharge, effective_seat_diameter, supply_drop_rate
-from epv_env.plant.effects.friction import (
+from epv_env.plant.effects.magnet import saturated_force, saturation_level
+from epv_env.plant.effects.measurement import lag_rate
+from epv_env.plant.effects.movers import (
     SLIDING_SPEED_MV,
     SLIDING_SPEED_PV,
     friction,
     stop_friction,
     stribeck,
 )
-from epv_env.plant.effects.magnet import saturated_force, saturation_level
-from epv_env.plant.effects.measurement import lag_rate
 from epv_env.plant.effects.registry import with_laws
 from epv_env.plant.effects.seats import opened
 from epv_env.plant.primitives import QUARTER_PI, Value, inlined, mass_flux, replacing

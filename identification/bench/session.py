@@ -15,11 +15,12 @@ from identification.bench.programmes import Programme
 from identification.recordings.columns import LEAST_RATE
 from identification.recordings.recording import (
     CHANNELS,
+    RULES,
     UNITS,
     Campaign,
     Recording,
+    RecordingRules,
 )
-from identification.recordings.rules import RULES, RecordingRules
 from identification.report_2003 import SAMPLING_RATE
 
 GREATEST_RATE = 20_000.0

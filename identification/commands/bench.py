@@ -14,7 +14,7 @@ from epv_env.plant.region import Region
 from identification.bench.programmes import SUITES, at_voltage, load_programmes
 from identification.bench.session import run_bench
 from identification.recordings.campaign_files import check_vacant, write_campaign
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import rules_of
 from identification.report_2003 import SAMPLING_RATE
 
 

@@ -19,7 +19,7 @@ from identification.importing.import_campaign import (
     source_table,
 )
 from identification.recordings.campaign_files import check_campaign, check_vacant, write_campaign
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import rules_of
 
 
 @dataclass(frozen=True)

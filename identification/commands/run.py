@@ -16,8 +16,7 @@ from identification.pipeline.identification import Identification
 from identification.pipeline.run import STAGES
 from identification.pipeline.summary import summary_section
 from identification.recordings.campaign_files import read_campaign
-from identification.recordings.recording import campaign_facts
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import campaign_facts, rules_of
 from identification.report.page import as_text, write_results
 
 JOURNAL = "searches.jsonl"

@@ -21,8 +21,7 @@ from identification.importing.mapping_file import MappingFile, RecordingEntry, m
 from identification.importing.source_file import ImportingError, SourceFile
 from identification.importing.text_files import read_text
 from identification.recordings.plausibility import switches
-from identification.recordings.recording import CHANNELS, Campaign, Recording
-from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.recording import CHANNELS, RULES, Campaign, Recording, RecordingRules
 
 FORMATS = (
     ("MDF", read_mdf, (".mf4", ".mdf", ".dat")),

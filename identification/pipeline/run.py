@@ -1,18 +1,16 @@
 """The whole identification of one campaign: its stages, the plant file, the report."""
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from importlib.metadata import version
 from pathlib import Path
-from time import perf_counter
 from typing import Any
 
 from epv_env.common.command_line import NextStep
-from epv_env.plant.parameters import Parameters
+from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant, save_plant
-from identification.calibration.section import calibration_json, calibration_section
-from identification.confidence.section import confidence_json, confidence_section
+from identification.calibration.calibrate import calibration_json, calibration_section
+from identification.confidence.confidence import confidence_json, confidence_section
 from identification.pipeline.identification import ESTIMATOR, Identification
 from identification.pipeline.summary import summary_section
 from identification.quality.assessment import assess_recording
@@ -21,9 +19,12 @@ from identification.quality.section import quality_section
 from identification.recordings.noise import campaign_steps
 from identification.recordings.recording import CampaignError, campaign_facts
 from identification.report.page import Section, Verdict, write_results
-from identification.sensitivity.collinearity import sensitivities_on_recordings
-from identification.sensitivity.one_at_a_time import sensitivities, studied_symbols
-from identification.sensitivity.section import sensitivity_json, sensitivity_section
+from identification.sensitivity import (
+    sensitivities_on_recordings,
+    sensitivity_json,
+    sensitivity_section,
+    studied_symbols,
+)
 from identification.validation import validation_json, validation_section
 
 PLANT_FILE = "plant.json"
@@ -44,8 +45,6 @@ class Stage:
     """The question that the stage answers, and the report's section."""
     compute: Callable[[Identification], Result]
     """Computes the stage and what it rests on. Raises CampaignError."""
-    time_share: float
-    """Share of a whole run's time, for the estimate of what is left."""
     role: str | None = None
     """Role of recordings that the stage needs; a whole run without them leaves the stage out."""
 
@@ -69,13 +68,11 @@ def quality(identification: Identification) -> Result:
 
 
 def sensitivity(identification: Identification) -> Result:
-    """Section 5 at the report's conditions, and what the campaign's own recordings can separate."""
+    """Section 5 on the campaign's own recordings."""
     problem = identification.problem
     replay, symbols = problem.least_squares().replay, studied_symbols()
     outputs = sensitivities_on_recordings(replay, symbols, problem.noise)
-    errors = sensitivities(Parameters.nominal(), symbols)
-    content = {"sensitivity": sensitivity_json(errors, outputs)}
-    return [sensitivity_section(errors, outputs)], content
+    return [sensitivity_section(outputs)], {"sensitivity": sensitivity_json(outputs)}
 
 
 def calibration(identification: Identification) -> Result:
@@ -97,15 +94,14 @@ def validation(identification: Identification) -> Result:
 
 
 STAGES = (
-    Stage("quality", "is the data good enough (section 4)", quality, 0.24, role="quality"),
-    Stage("sensitivity", "which parameters matter (section 5)", sensitivity, 0.04),
-    Stage("calibrate", "fit the parameters (section 6.2)", calibration, 0.4),
-    Stage("confidence", "how sure the estimates are (section 6.3)", confidence, 0.16),
+    Stage("quality", "is the data good enough (section 4)", quality, role="quality"),
+    Stage("sensitivity", "which parameters matter (section 5)", sensitivity),
+    Stage("calibrate", "fit the parameters (section 6.2)", calibration),
+    Stage("confidence", "how sure the estimates are (section 6.3)", confidence),
     Stage(
-        "validate", "does the model hold on held-out recordings (section 7)", validation, 0.16,
-        role="validation",
+        "validate", "does the model hold on held-out recordings (section 7)", validation, "validation"
     ),
-)  # fmt: skip
+)
 """In the order of the report."""
 
 
@@ -124,16 +120,11 @@ def run(identification: Identification, out: Path, next_step: NextStep) -> Plant
     next_step: what the report names at its end. Raises CampaignError if the campaign has no recording
     to fit to.
     """
-    began, done = perf_counter(), 0.0
     sections: list[Section] = []
     content: dict[str, Any] = {}
-    for number, stage in enumerate(STAGES, start=1):
-        seconds = perf_counter() - began
-        left = f", about {seconds * (1 - done) / done:.0f} s left" if done else ""
-        print(f"[{number}/{len(STAGES)}] {stage.name}{left}", file=sys.stderr)
+    for stage in progress(STAGES, what="stages"):
         shown, fields = result_or_omission(stage, identification)
         sections, content = [*sections, *shown], content | fields
-        done += stage.time_share
     plant = calibrated_plant(identification)
     write_results(
         out,
@@ -145,7 +136,6 @@ def run(identification: Identification, out: Path, next_step: NextStep) -> Plant
         next_step=next_step,
     )
     save_plant(plant, out / PLANT_FILE)
-    print(f"[done] {perf_counter() - began:.0f} s", file=sys.stderr)
     return plant
 
 

@@ -4,7 +4,7 @@ from collections.abc import Iterable
 
 from epv_env.plant.parameters import table
 from identification.calibration.calibrate import EXPLAINED, inseparable_symbols, symbols_on_bounds
-from identification.confidence.section import PRECISE
+from identification.confidence.confidence import PRECISE
 from identification.pipeline.identification import ESTIMATOR, Identification
 from identification.report.page import ANSWERS, Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR

@@ -24,9 +24,16 @@ from identification.recordings.columns import (
     read_columns,
 )
 from identification.recordings.noise import column_steps
-from identification.recordings.recording import CHANNELS, ROLES, Campaign, CampaignError, Recording
+from identification.recordings.recording import (
+    CHANNELS,
+    ROLES,
+    RULES,
+    Campaign,
+    CampaignError,
+    Recording,
+    RecordingRules,
+)
 from identification.recordings.recording_checks import check_recording
-from identification.recordings.rules import RULES, RecordingRules
 
 FORMAT = "epv-campaign/1"
 """Version of campaign.json, in its field `format`."""

@@ -20,9 +20,8 @@ from identification.recordings.campaign_files import (
 )
 from identification.recordings.columns import line_number, read_columns, sampling_period
 from identification.recordings.plausibility import check_units, gauge_contradiction
-from identification.recordings.recording import HOLD, CampaignError
+from identification.recordings.recording import HOLD, RULES, CampaignError, RecordingRules
 from identification.recordings.recording_checks import check_range
-from identification.recordings.rules import RULES, RecordingRules
 
 PERIOD_TOLERANCE = 1e-3
 """Relative difference between the stated control period and that of the times [-]."""

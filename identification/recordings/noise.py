@@ -11,8 +11,15 @@ from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL
 from identification.readings_noise import quantisation_step, rounding_error, white_noise
-from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, Campaign, Recording
-from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.recording import (
+    CHANNELS,
+    PRESSURES,
+    RULES,
+    UNITS,
+    Campaign,
+    Recording,
+    RecordingRules,
+)
 
 GRID_ERROR = 0.1
 """Distance from a grid, in its steps, within which a reading lies on it; digits are few."""

@@ -14,8 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.recordings.columns import CHANNEL_OF, line_number
-from identification.recordings.recording import CampaignError
-from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.recording import RULES, CampaignError, RecordingRules
 
 Signals = Mapping[str, NDArray]
 """Readings by channel, each (samples,) [A, V or bar]."""

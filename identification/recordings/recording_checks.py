@@ -19,8 +19,7 @@ from identification.recordings.columns import (
     sampling_period,
 )
 from identification.recordings.plausibility import check_units, switches
-from identification.recordings.recording import HOLD, CampaignError
-from identification.recordings.rules import RULES, RecordingRules
+from identification.recordings.recording import HOLD, RULES, CampaignError, RecordingRules
 
 LEAST_REST = 0.5
 """Least duration of a quality recording [s]; statistics of less mean little."""

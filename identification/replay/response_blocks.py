@@ -7,8 +7,7 @@ from matplotlib.figure import Figure
 
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.replay import Response, total_response_error
-from identification.report.page import Picture, Table
-from identification.report.signals import over_time
+from identification.report.page import Picture, Table, over_time
 
 
 def error_table(responses: Sequence[Response], caption: str) -> Table:

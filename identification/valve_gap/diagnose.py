@@ -28,8 +28,7 @@ from identification.gap.judge.verdict import AMBIGUOUS, UNKNOWN
 from identification.gap.report.gap_json import fitted_values, parameter_covariance, write_results
 from identification.gap.report.page import sections
 from identification.recordings.campaign_files import read_campaign
-from identification.recordings.recording import campaign_facts
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import campaign_facts, rules_of
 from identification.report.page import Section, write_page
 from identification.valve_gap.next_recording import CANDIDATES, NextRecording, next_recording
 from identification.valve_gap.next_recording import FILE_NAME as PROGRAMME

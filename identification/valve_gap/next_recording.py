@@ -10,7 +10,7 @@ from epv_env.common.units import BAR
 from identification.bench.programmes import Programme
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.judge.verdict import KNOWN, NO_GAP, UNKNOWN, Ranking
-from identification.gap.report.quantities import gap_text, listed, probability_text
+from identification.gap.report.sentences import gap_text, listed, probability_text
 from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.model_inputs import ModelInputs
 from identification.replay.replay import Replay

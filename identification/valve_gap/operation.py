@@ -40,8 +40,7 @@ from identification.recordings.openings import (
     pauses,
     start_of,
 )
-from identification.recordings.recording import OUTPUTS, Campaign, Recording, campaign_facts
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import OUTPUTS, Campaign, Recording, campaign_facts, rules_of
 from identification.replay.replay import FLOW_RAMP, FLOW_SHIFT
 from identification.valve_gap.diagnose import (
     JOURNAL,

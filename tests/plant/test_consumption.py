@@ -11,7 +11,6 @@ from epv_env.plant.consumption import (
     Profiles,
     check_scenario,
     draw_profile,
-    totals,
 )
 
 LONGEST_PERIOD = 0.1
@@ -112,14 +111,3 @@ def test_episodes_are_read_independently():
 def test_an_unknown_name_is_refused():
     with pytest.raises(ValueError, match="unknown consumption scenario 'x': choose one of mixed, no"):
         check_scenario("x")
-
-
-@pytest.mark.parametrize("name", ["service", "pumping", "creeping"])
-def test_totals_are_the_sums_of_the_mean_flows(name):
-    profiles, period = Profiles(3), 5e-3
-    for i in range(3):
-        profiles.start(i, SCENARIOS[name].draw(np.random.default_rng(i)))
-    times = np.arange(1201) * period
-    found = totals(profiles.progress, times)
-    flows = [profiles.mean_flow(np.full(3, time), period) for time in times[:-1]]
-    np.testing.assert_allclose(np.diff(found, axis=1).T, np.array(flows) * period, atol=1e-12)

@@ -10,8 +10,8 @@ from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.chambers import chamber_rates
 from epv_env.plant.effects.coil import COOLING_TIME, COPPER
 from epv_env.plant.effects.flows import FILLING_TIME
-from epv_env.plant.effects.friction import STRIBECK_SPEED, stribeck
 from epv_env.plant.effects.law import KNOTS, placed
+from epv_env.plant.effects.movers import STRIBECK_SPEED, stribeck
 from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, has_effects
 from epv_env.plant.equations import (
     Coefficients,

@@ -30,4 +30,3 @@ def test_the_short_form_writes_results_and_page(tmp_path):
     found = json.loads((tmp_path / "coverage.json").read_text(encoding="utf-8"))
     assert set(found) >= {"joint region", "interval of alphaMV"}
     assert "| joint region |" in (tmp_path / "README.md").read_text(encoding="utf-8")
-    assert (tmp_path / "coverage.png").exists()

@@ -1,54 +1,131 @@
-"""Evaluation on a device, which numba's simulator stands for, in processes of their own."""
+"""Episodes on a device give what they give on the processor.
 
+Without an accelerator numba's simulator stands for it, as in tests/env/test_device.py.
+"""
+
+import json
 import os
-import pickle
 import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-pytest.importorskip("stable_baselines3")
+pytest.importorskip("joblib")
 from controllers.hysteresis import Hysteresis
-from training.evaluation.batches import Batch, _run, in_batches
+from controllers.tuned import tuned
+from docs.examples.relay import Relay
+from docs.studies.device.study import controllers, on_cpu
+from epv_env.device.kernels import P2, episodes_kernel
+from epv_env.period import rules_of
+from tests.env.test_device import compiles, simulated
+from training.evaluation import batches
+from training.evaluation.metrics import METER, count
+from training.evaluation.on_device import NOTHING, run_begun
+from training.evaluation.rollout import make_env
+from training.rare.episodes import Episodes
 
-pytestmark = [pytest.mark.training, pytest.mark.slow]
-CONTROLLER = Hysteresis(open_below=0.0, shut_above=0.0)
+pytestmark = pytest.mark.training
+
+N, PERIODS, RESTART = 3, 40, 20
+SEEDS = [3, 4, 5]
+OPTIONS: dict[str, Any] = {
+    "settling_time": 0.05, "scenario": "emergency", "drop_bar": (0.2, 0.6),
+    "conditions": {"worn": 0.5, "delayed": 0.5}, "threads": 1,
+}  # fmt: skip
+WITHIN = 1e-4  # Pa, that is 1e-6 mbar
 
 
-def batch(device: str) -> Batch:
+def test_every_controller_decides_on_a_simulated_device_as_on_the_cpu(tmp_path):
+    """Two lanes for three episodes: one takes a second episode from the queue."""
+    names, cases = (
+        list(controllers()),
+        [on_cpu(each, SEEDS, PERIODS, RESTART, **OPTIONS) for each in controllers().values()],
+    )
+    settings = {"periods": PERIODS, "restart": RESTART, "lanes": 2}
+    works = [each | settings | {"record": np.zeros((PERIODS, 2, N))} for _, _, each in cases]
+    found = simulated(tmp_path, run_begun, works)
+    for case, (record, meters, _), (counted, work) in zip(names, cases, found, strict=True):
+        np.testing.assert_array_equal(work["record"][:, 0], record[:, 0], err_msg=case)
+        np.testing.assert_allclose(work["record"][:, 1], record[:, 1], rtol=0, atol=WITHIN)
+        for name in METER.names or ():
+            np.testing.assert_allclose(counted[name], meters[name], atol=1e-6, err_msg=name)
+        assert np.ptp(record[:, 0]) == 1.0  # it switched
+
+
+def test_an_episode_does_not_depend_on_the_number_of_lanes(tmp_path):
+    """With its own noise, which follows from each episode's key."""
+    _, _, work = on_cpu(Hysteresis(open_below=0.0, shut_above=0.0), SEEDS, 0, **OPTIONS)
+    work |= {"noise": NOTHING, "periods": 6}
+    works = [work | {"lanes": lanes, "record": np.zeros((6, 2, N))} for lanes in (1, 3)]
+    (one, a), (three, b) = simulated(tmp_path, run_begun, works)
+    np.testing.assert_array_equal(one, three)
+    np.testing.assert_array_equal(a["record"], b["record"])
+
+
+@pytest.mark.parametrize("name", [pytest.param("PPO", marks=pytest.mark.slow), "hysteresis"])
+def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
+    controller = controllers()[name]
+    _, _, work = on_cpu(controller, SEEDS, 0, **OPTIONS)
+    arguments = (
+        work["begun"], rules_of(work["settings"]), controller.constants, np.zeros(1, controller.record),
+        NOTHING, PERIODS, RESTART, np.zeros(1, np.int64), np.zeros(N, METER), NOTHING,
+    )  # fmt: skip
+    kernel = episodes_kernel(type(controller).decide, controller.record, count, True)
+    assert compiles(kernel, arguments, monkeypatch)
+
+
+def test_a_rare_episode_is_the_same_on_a_device(monkeypatch):
+    """The device gets its start and its noise, which follow from its numbers."""
+    given: dict[str, Any] = {}
+
+    def stub(controller, begun, settings, *, periods, noise):
+        given.update(begun=begun, periods=periods, noise=noise)
+        return np.zeros(2, METER)
+
+    monkeypatch.setattr("training.evaluation.on_device.run_begun", stub)
+    episodes = Episodes(controller=tuned("hysteresis"), duration=0.6, options={}, device="cuda")
+    normals = np.random.default_rng(0).standard_normal((2, sum(vars(episodes.moves).values())))
+    episodes.worst(normals)
+    task = make_env(episodes.controller, 2).task
+    task.begin_from(np.arange(2), episodes.starts(normals))
+    np.testing.assert_array_equal(given["noise"][:, : task._noise.shape[1]], task._noise)
+    np.testing.assert_array_equal(given["begun"].numbers[P2], task.valves.state.p2)
+    assert given["periods"] == 120 < given["noise"].shape[1]
+
+
+def part(device: str) -> batches.Batch:
     """Two short episodes without noise, in worn valves."""
-    conditions = {"worn": 1.0, "delayed": 1.0}
-    options = {"sensor_noise": 0.0, "settling_time": 0.0, "conditions": conditions}
-    return Batch(
+    options = {**OPTIONS, "settling_time": 0.0, "sensor_noise": 0.0}
+    return batches.Batch(
         name="", controller="", first_seed=3, episodes=2, duration=0.06, options=options, device=device
     )
 
 
-EVALUATE = """
-import pickle, sys
-from tests.training.test_device import CONTROLLER, _run, batch
-
-pickle.dump(_run(batch("cuda"), CONTROLLER)[1], open(sys.argv[1], "wb"))
-"""
-
-
-def simulate(code: str, *paths: Path) -> None:
-    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
-    subprocess.run([sys.executable, "-c", code, *paths], env=environment, check=True, timeout=600)
-
-
-def test_a_batch_on_a_simulated_device_gives_the_figures_of_the_cpu(tmp_path: Path):
-    file = tmp_path / "figures"
-    simulate(EVALUATE, file)
-    figures = pickle.loads(file.read_bytes())
-    for name, expected in _run(batch("cpu"), CONTROLLER)[1].items():
+def test_a_batch_on_a_simulated_device_gives_the_figures_of_the_cpu(tmp_path):
+    work = {"batch": part("cuda"), "controller": tuned("hysteresis")}
+    (((_, figures), _),) = simulated(tmp_path, batches._run, [work])
+    for name, expected in batches._run(part("cpu"), work["controller"])[1].items():
         np.testing.assert_allclose(figures[name], expected, atol=1e-6, err_msg=name)
 
 
+def test_a_controller_of_the_host_runs_on_the_processor():
+    (asked,), (cpu,) = (batches.run_batches([part(d)], {"": Relay()}, what="") for d in ("cuda", "cpu"))
+    np.testing.assert_array_equal(asked.episode_return, cpu.episode_return)
+
+
 def test_batches_of_a_device_are_larger_and_have_names_of_their_own():
-    parts, others = (in_batches(replace(batch(d), episodes=9000)) for d in ("cuda", "cpu"))
+    parts, others = (batches.in_batches(replace(part(d), episodes=300_000)) for d in ("cuda", "cpu"))
     assert len(parts) == 2 < len(others)
     assert not {part.name for part in parts} & {part.name for part in others}
+
+
+@pytest.mark.slow
+def test_the_study_runs_in_the_simulator(tmp_path):
+    environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
+    command = [sys.executable, "-m", "docs.studies.device.study", "--quick", "--out", tmp_path]
+    subprocess.run(command, env=environment, check=True, timeout=600)
+    rows = json.loads((tmp_path / "figures.json").read_text())["checks"]
+    assert len(rows) == 2 + len(controllers())

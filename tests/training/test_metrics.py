@@ -3,9 +3,11 @@
 import numpy as np
 import pytest
 
+from epv_env.result import CONSUMPTION, DEVIATION, FAILED, N_FIGURE, REWARD, SWITCHINGS, VENTED
 from training.evaluation.metrics import (
+    METER,
     EpisodeMetrics,
-    Meter,
+    count_all,
     summary,
     tail_excursion,
     violation_interval,
@@ -15,17 +17,14 @@ PERIOD = 0.1
 
 
 def run(deviations, settling_time=0.0, failed=None, consumption=None):
-    """The metrics of one episode with these deviations [bar], a switching and 1 mg in each period."""
-    meter = Meter(1, PERIOD, settling_time)
+    """The metrics of one episode with these deviations [bar]; each period: a switching, 1 mg, 2 W."""
+    meters, figures = np.zeros(1, METER), np.zeros((N_FIGURE, 1))
+    figures[[SWITCHINGS, VENTED, REWARD], 0] = 1.0, 1e-6, -1.0
     for k, deviation in enumerate(deviations):
-        info = {
-            "deviation_bar": np.array([deviation]),
-            "switchings": np.array([1]),
-            "vented_g": np.array([1e-3]),
-            "consumption_g_per_s": np.array([0.0 if consumption is None else consumption[k]]),
-        }
-        meter.update(np.array([-1.0]), np.array([failed == k]), info)
-    return meter.result()
+        drawn = 0.0 if consumption is None else 1e-3 * consumption[k]
+        figures[[DEVIATION, CONSUMPTION, FAILED], 0] = deviation, drawn, failed == k
+        count_all(meters, figures, np.array([2.0 * PERIOD * (k + 1)]), PERIOD, settling_time)
+    return EpisodeMetrics.of(meters, PERIOD)
 
 
 def test_figures_of_a_known_episode():
@@ -36,6 +35,7 @@ def test_figures_of_a_known_episode():
     assert m.rms_bar[0] == pytest.approx(np.sqrt((0.01 + 0.09 + 0.16 + 0.04) / 4))
     assert m.switchings_per_s[0] == pytest.approx(1 / PERIOD)
     assert m.vented_g_per_s[0] == pytest.approx(1e-3 / PERIOD)
+    assert m.coil_W[0] == pytest.approx(2.0)
     assert m.episode_return[0] == -4.0
     assert m.stayed[0]
 

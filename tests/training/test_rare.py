@@ -9,7 +9,7 @@ pytest.importorskip("joblib")
 from scipy.special import ndtri
 from scipy.stats import kstest
 
-from controllers.knowledge import ValveKnowledge, cannot_raise, would_rise_too_far
+from controllers.knowledge import ValveKnowledge, forced, keeps_on
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from controllers.valve_learner import LEARNT
@@ -133,9 +133,15 @@ def test_no_reading_opens_above_the_band_or_keeps_shut_below_it_and_without_shie
         seen = random_observations(500, rng)
         above, below = outside(seen)
         off, on = controller.network.logits(knowledge.observe(seen)).T
-        ruled = np.array([cannot_raise(v) or would_rise_too_far(v) for v in knowledge.valves])
+        ruled = np.array([keeps_on(v) for v in knowledge.valves])
         bare = np.where(ruled | ~(off >= on), 1, 0)
-        shielded = knowledge.overruled(bare)
+        forces = np.array(
+            [
+                forced(v, error)
+                for v, error in zip(knowledge.valves, decode(seen, "p2_error"), strict=True)
+            ]
+        )
+        shielded = np.where(forces > 0, 1, np.where(forces < 0, 0, bare))
         assert np.all(shielded[above] == 1)
         assert np.all(shielded[below & ~ruled] == 0)
         counts = above, above & (bare == 0), below & ~ruled, below & ~ruled & (bare == 1)

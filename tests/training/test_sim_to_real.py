@@ -16,9 +16,9 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from identification.commands import bench
+from training.commands.sim_to_real import MEASURED, SIMULATED, gap_table, share_picture, trained
 from training.evaluation.scenarios import EVALUATION
 from training.studies.comparison import SCORES, compare
-from training.studies.sim_to_real import MEASURED, SIMULATED, gap_table, share_picture, trained
 
 pytestmark = pytest.mark.training
 

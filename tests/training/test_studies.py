@@ -12,7 +12,6 @@ from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE
 from docs.studies.comparison import study as comparison
-from docs.studies.robustness import study as robustness
 from docs.studies.sim_to_real import study as sim_to_real
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
@@ -30,14 +29,6 @@ def test_the_comparison(tmp_path, monkeypatch):
     assert names <= {path.name for path in tmp_path.iterdir()}
     assert "| extrapolating hysteresis |" in (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "restart" in set(pd.read_csv(tmp_path / "beyond.csv")["scenario"])
-
-
-def test_the_sweep(tmp_path, monkeypatch):
-    monkeypatch.setattr(robustness, "CONTROLLERS", ("extrapolating hysteresis",))
-    assert robustness.main(["--quick", "--out", str(tmp_path)]) == 0
-    text = (tmp_path / PAGE).read_text(encoding="utf-8")
-    assert "| 13 parameters ±10 % | extrapolating hysteresis |" in text
-    assert (tmp_path / "robustness-conditions.png").exists()
 
 
 def test_the_loop(tmp_path, monkeypatch):

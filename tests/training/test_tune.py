@@ -2,10 +2,9 @@
 
 import pytest
 
-from controllers.registration import Choice, Range
 from controllers.tuned import Tuning, load_tunings, save_tunings
 from epv_env.common.commands import main_of
-from training.commands.tune import _search, kept, widened
+from training.commands.tune import kept
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
@@ -39,25 +38,3 @@ def test_another_budget_is_refused_and_the_file_left_alone(tmp_path, capsys):
 
 def test_nothing_is_kept_of_a_file_that_is_not_there(tmp_path):
     assert kept(tmp_path / "none.json", SEARCH) == {}
-
-
-def test_a_wider_search_is_no_worse_than_the_one_before():
-    space = {"x": Range(low=-100.0, high=100.0)}
-    study = _search("any", space, lambda values: -abs(values["x"]), 3, 0, {"x": 1e-3})
-    assert study.best_params == {"x": 1e-3}
-
-
-def test_a_search_that_ends_at_a_bound_is_widened_to_its_physical_limit_at_most():
-    space = {
-        "depth": Range(low=0.1, high=1.0, log=True, most=5.0),
-        "setpoint": Range(low=-0.4, high=0.4, least=-2.0),
-        "lag": Choice(values=(1, 2)),
-    }
-    assert widened(space, {"depth": 0.5, "setpoint": 0.0, "lag": 2}) == space
-    wider = widened(space, {"depth": 0.99, "setpoint": -0.39, "lag": 2})
-    assert wider["depth"] == Range(low=0.1, high=5.0, log=True, most=5.0)
-    setpoint = wider["setpoint"]
-    assert isinstance(setpoint, Range)
-    assert setpoint.low == pytest.approx(-1.2)
-    # A second time the search goes no further than the limit.
-    assert widened(wider, {"depth": 4.99, "setpoint": 0.0, "lag": 2}) == wider

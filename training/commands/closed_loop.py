@@ -15,7 +15,7 @@ from epv_env.common.command_line import NextStep
 from epv_env.common.options import Folder, PlantFile, Seed
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import read_log
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import rules_of
 from training.closed_loop import ClosedLoop
 from training.evaluation.named import HELP, SHIPPED, named_controllers
 

@@ -24,7 +24,7 @@ from epv_env.common.options import Folder, Number, PlantFile, Seed
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
 from identification.recordings.log_files import Log, read_log
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import rules_of
 from training.evaluation.plots import save_figure
 from training.monitoring import monitor_model
 

@@ -15,9 +15,10 @@ import numpy as np
 
 from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal, write_json, write_text
-from epv_env.common.options import Folder, JudgedSeconds, Number, PlantFile, Quick, Seed
+from epv_env.common.options import Device, Folder, JudgedSeconds, Number, PlantFile, Quick, Seed
 from epv_env.plant.plantfile import load_plant, plant_subject
 from epv_env.reward import BAND_BAR
+from epv_env.vector_entry import check_device
 from training.evaluation.batches import run_jobs
 from training.evaluation.named import HELP, SHIPPED, named_controllers
 from training.evaluation.plots import save_figure
@@ -48,6 +49,7 @@ class Options:
     seed: Annotated[Seed, "of the random numbers behind all episodes"] = 0
     plant: PlantFile = None
     workers: Annotated[int | None, Number(int, 1, 1024), "processes (default: all cores)"] = None
+    device: Device = "cpu"
     quick: Quick = False
 
 
@@ -56,6 +58,7 @@ def run(options: Options) -> None:
 
     Raises ValueError for an unknown controller.
     """
+    check_device(options.device)
     plant = load_plant(options.plant)
     controllers, digests = named_controllers([options.controller], plant)
     ((label, controller),) = controllers.items()
@@ -67,12 +70,13 @@ def run(options: Options) -> None:
             "plant": plant, "parameters": plant_region(REGIONS[options.region], plant),
             **EVALUATION[RANDOM].options,
         },
+        device=options.device,
     )  # fmt: skip
     problem = Problem(
         level=episodes.worst, moves=episodes.moves, particles=options.particles // CHAIN * CHAIN
     )
     journal = Journal(options.out / "finished.jsonl", {**plant_subject(plant), **settings})
-    work = {"journal": journal, "workers": options.workers}
+    work = {"journal": journal, "workers": options.workers if options.device == "cpu" else 1}
     pilot = partial(
         problem.thresholds, BAND_BAR, options.least, np.random.default_rng([options.seed, 0])
     )

@@ -22,14 +22,13 @@ from epv_env.plant.plantfile import load_plant, plant_subject
 from epv_env.vector_entry import check_device
 from training.evaluation.batches import Batch, run_batches
 from training.evaluation.named import HELP, named_controllers
-from training.evaluation.plots import save_figure
 from training.evaluation.seeds import SWEEP_SEED, check_first_seed
-from training.studies.sweep_designs import DESIGNS, chosen_points
-from training.studies.sweep_report import (
+from training.studies.sweep import (
+    DESIGNS,
+    chosen_points,
     harmful_changes,
     point_table,
     region_table,
-    share_figure,
 )
 
 DEFAULT = ("extrapolating hysteresis", "adaptive pulse", "PWM")
@@ -39,13 +38,6 @@ QUICK: dict[str, Any] = {
     "controllers": DEFAULT[:1], "episodes": 4, "joint_episodes": 16, "duration": 0.6,
     "factors": ["R", "V2", "piston_friction", "sensor noise", "control period", "latency"],
 }  # fmt: skip
-
-FIGURES = {
-    "robustness-parameters": ("parameters",),
-    "robustness-effects": ("effects",),
-    "robustness-conditions": ("regions", "conditions"),
-}
-"""Designs of each picture."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,7 +57,7 @@ class Options(Episodes):
 
 
 def run(options: Options) -> None:
-    """Run the episodes that --out lacks; write tables and pictures.
+    """Run the episodes that --out lacks; write and print tables.
 
     Raises ValueError for an unknown controller, scenario or factor.
     """
@@ -109,12 +101,9 @@ def next_step(options: Options) -> NextStep:
 
 
 def write_results(options: Options, points: pd.DataFrame, settings: dict[str, Any]) -> None:
-    """Write points.csv, results.json and the pictures; print the tables."""
+    """Write points.csv and results.json; print the tables."""
     write_text(options.out / "points.csv", points.to_csv(index=False))
     content = {"format": "epv-sweep/3", "settings": settings, "points": points.to_dict("records")}
     write_json(options.out / "results.json", content)
-    for name, designs in FIGURES.items():
-        if set(designs) & set(points["design"]):
-            save_figure(share_figure(points, designs), options.out / f"{name}.png")
     texts = (region_table(points), harmful_changes(points))
     print("\n\n".join(text.to_string(index=False) for text in texts if len(text)))

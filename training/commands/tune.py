@@ -6,16 +6,15 @@
 The objective is the mean return on the training scenarios.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
 import optuna
 from optuna.trial import Trial
 
-from controllers.registration import Choice, Range, SearchSpace
+from controllers.registration import Choice, SearchSpace
 from controllers.registry import TUNED_KINDS, registration
 from controllers.tuned import TUNED_FILE, Tuning, load_search, load_tunings, save_tunings
 from epv_env.common.command_line import NextStep
@@ -24,10 +23,6 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import TUNING_SEED
-
-WIDENINGS = 2
-"""Most repetitions of a kind's search, each wider than the one before. Two quadruple a range, or reach
-its physical limit."""
 
 
 def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
@@ -43,11 +38,11 @@ def suggest(space: SearchSpace, trial: Trial) -> dict[str, Any]:
 def tune(
     kind: str, *, trials: int, episodes: int, duration: float, seed: int, options: dict[str, Any]
 ) -> Tuning:
-    """Search one kind of controller; a search that ends at a bound is widened and run again.
+    """Search one kind of controller.
 
     Args:
         kind: one of TUNED_KINDS.
-        trials: evaluations of a search.
+        trials: evaluations of the search.
         episodes: episodes of an evaluation.
         duration: length of an episode [s].
         seed: of the search.
@@ -55,40 +50,21 @@ def tune(
     """
     space = registration(kind).search_space
     assert space is not None, f"{kind} has nothing to tune"
-    run = partial(
-        _mean_return, kind, seeds=list(range(TUNING_SEED, TUNING_SEED + episodes)),
-        duration=duration, options=options,
-    )  # fmt: skip
-    study, searched = _search(kind, space, run, trials, seed), space
-    for _ in range(WIDENINGS):
-        wider = widened(searched, study.best_params)
-        if wider == searched:
-            break
-        print(f"{kind}: the search ended at a bound; searching wider: {_named(searched, wider)}")
-        study, searched = _search(kind, wider, run, trials, seed, study.best_params), wider
-    if widened(searched, study.best_params) != searched:
-        print(f"{kind}: the search ended at a bound again after {WIDENINGS} wider ones; it is kept")
+    seeds = list(range(TUNING_SEED, TUNING_SEED + episodes))
+    study = optuna.create_study(
+        direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
+    )
+
+    def objective(trial: Trial) -> float:
+        values = suggest(space, trial)
+        return _mean_return(kind, values, seeds=seeds, duration=duration, options=options)
+
+    for _ in progress(range(trials), what=f"{kind:27s}"):
+        study.optimize(objective, n_trials=1)
     return Tuning(
         values=study.best_params, trials=trials, mean_return=study.best_value, episodes=episodes,
-        widened=_named(space, searched), plants=options["parameters"],
+        plants=options["parameters"],
     )  # fmt: skip
-
-
-def widened(space: SearchSpace, values: Mapping[str, Any]) -> SearchSpace:
-    """The space to search next after `values` were found in `space`; itself if none is at a bound."""
-    return {
-        name: quantity if isinstance(quantity, Choice) else quantity.widened(values[name])
-        for name, quantity in space.items()
-    }
-
-
-def _named(before: SearchSpace, after: SearchSpace) -> dict[str, tuple[float, float]]:
-    """The ranges of `after` that differ from `before`, by name."""
-    return {
-        name: (quantity.low, quantity.high)
-        for name, quantity in after.items()
-        if isinstance(quantity, Range) and quantity != before[name]
-    }
 
 
 def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
@@ -99,21 +75,6 @@ def _mean_return(kind: str, values: dict[str, Any], **scenarios: Any) -> float:
         raise optuna.TrialPruned(str(contradiction)) from None
     metrics = run_episodes(controller, **scenarios)
     return float(metrics.episode_return.mean())
-
-
-def _search(
-    kind: str, space: SearchSpace, run: Callable[[dict[str, Any]], float], trials: int, seed: int,
-    first: Mapping[str, Any] | None = None,
-) -> optuna.Study:  # fmt: skip
-    """One search of a space. first: values to try first, so that the outcome is no worse than they."""
-    study = optuna.create_study(
-        direction="maximize", sampler=optuna.samplers.TPESampler(seed=seed, multivariate=True)
-    )
-    if first is not None:
-        study.enqueue_trial(dict(first))
-    for _ in progress(range(trials), what=f"{kind:27s}"):
-        study.optimize(lambda trial: run(suggest(space, trial)), n_trials=1)
-    return study
 
 
 def kept(path: Path, search: dict[str, Any]) -> dict[str, Tuning]:

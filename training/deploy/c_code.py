@@ -101,6 +101,7 @@ def controller_c(export: Export) -> ControllerC:
     c.function(valve_learner.observe, (VALVE, PLANT, PLANT, ARRAY, REAL, REAL, REAL))
     c.function(pulse.plan, (VALVE, PLANT, PLANT, PLANT, REAL))
     c.function(knowledge.shown, (REAL, REAL))
+    c.function(knowledge.keeps_on, (VALVE,))
     c.function(knowledge.above_band, (REAL,))
     c.function(knowledge.forced, (VALVE, REAL))
     return c

@@ -5,7 +5,7 @@ in whatever process and order it runs. Finished batches lie in a journal (epv_en
 """
 
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any
@@ -15,7 +15,7 @@ from joblib import Parallel, delayed
 from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
-from controllers.base import Controller
+from controllers.base import Controller, decides_on_device
 from epv_env.common.files import Journal
 from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
@@ -27,7 +27,7 @@ BATCH_EPISODES = 512
 ones."""
 
 
-DEVICE_EPISODES = 8192
+DEVICE_EPISODES = 262_144
 """The same on an accelerator, which wants many."""
 
 
@@ -48,7 +48,7 @@ class Batch:
     restart_s: float | None = None
     """When the control unit restarts [s]; None: never."""
     device: str = "cpu"
-    """Of the plants: "cpu", or "cuda" for an accelerator, whose noise is another."""
+    """On which they run: "cpu", or "cuda" for an accelerator, whose noise is another."""
 
 
 def in_batches(whole: Batch) -> list[Batch]:
@@ -79,21 +79,17 @@ def run_batches(
         batches: with names of their own.
         controllers: by label.
         journal: parts that are finished; new ones are added.
-        workers: processes; None: one for each core.
+        workers: processes; None: one for each core. An accelerator has one, before the others begin.
         what: name of the progress bar.
     """
-    parts = [in_batches(whole) for whole in batches]
+    parts = [in_batches(_placed(each, controllers)) for each in batches]
     finished: dict[str, Any] = {}
     missing = [p for each in parts for p in each if journal is None or p.name not in journal]
-    longest_first = sorted(missing, key=lambda part: -part.episodes * part.duration)
-    # Processes, not threads: most of an episode is NumPy on short arrays, which holds Python's lock.
-    pool: Any = Parallel(n_jobs=workers or available_cores(), return_as="generator_unordered")
-    jobs = (delayed(_run)(part, controllers[part.controller]) for part in longest_first)
     with tqdm(
         total=sum(part.episodes for part in missing), desc=what, unit="episode", file=sys.stderr,
         mininterval=0.2 if sys.stderr.isatty() else 10.0,
     ) as bar:  # fmt: skip
-        for name, figures in pool(jobs):
+        for name, figures in _results(missing, controllers, workers or available_cores()):
             finished[name] = figures
             if journal is not None:
                 journal.add(name, figures)
@@ -105,6 +101,25 @@ def run_batches(
         return journal.read(part.name, _metrics)
 
     return [EpisodeMetrics.joined([metrics(part) for part in each]) for each in parts]
+
+
+def _placed(batch: Batch, controllers: Mapping[str, Controller]) -> Batch:
+    """The batch on the processor if its controller decides nowhere else."""
+    if batch.device == "cpu" or decides_on_device(controllers[batch.controller]):
+        return batch
+    return replace(batch, device="cpu")
+
+
+def _results(
+    parts: Sequence[Batch], controllers: Mapping[str, Controller], processes: int
+) -> Iterator[tuple[str, dict[str, list[Any]]]]:
+    """Names and figures of batches, as they end."""
+    there, here = ([p for p in parts if (p.device == "cpu") == cpu] for cpu in (False, True))
+    yield from (_run(part, controllers[part.controller]) for part in there)
+    longest_first = sorted(here, key=lambda part: -part.episodes * part.duration)
+    # Processes, not threads: most of an episode is NumPy on short arrays, which holds Python's lock.
+    pool: Any = Parallel(n_jobs=processes, return_as="generator_unordered")
+    yield from pool(delayed(_run)(part, controllers[part.controller]) for part in longest_first)
 
 
 def run_jobs(
@@ -132,16 +147,17 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     own: Any = deepcopy(controller)
     settings = {"threads": 1, "control_period": batch.options.get("control_period")}
     known = {name: v for name, v in settings.items() if v is not None and hasattr(own, name)}
-    seeds = list(range(batch.first_seed, batch.first_seed + batch.episodes))
-    device: dict[str, Any] = {}
-    if batch.device != "cpu":  # each episode begins with its own seed
-        device = {"device": batch.device, "to_host": True, "starts": batch.episodes}
+    run: Callable[..., EpisodeMetrics] = run_episodes
+    if batch.device != "cpu":
+        from training.evaluation import on_device  # compiles for an accelerator: of no use elsewhere
+
+        run = on_device.run_episodes
     with threadpool_limits(1):  # the figures must not depend on the threads of the linear algebra
-        metrics = run_episodes(
+        metrics = run(
             replace(own, **known) if known else own,
-            seeds=seeds,
+            seeds=range(batch.first_seed, batch.first_seed + batch.episodes),
             duration=batch.duration,
-            options={"threads": 1, **device, **batch.options},
+            options={"threads": 1, **batch.options},
             restart_s=batch.restart_s,
         )
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}

@@ -10,11 +10,15 @@ Cost: switchings of the coil, air vented, coil energy.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, fields
+from typing import Any
 
+import numba
 import numpy as np
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from epv_env.plant.primitives import exact, source_digest
+from epv_env.result import CONSUMPTION, DEVIATION, FAILED, REWARD, SWITCHINGS, VENTED
 from epv_env.reward import BAND_BAR
 from training.evaluation.statistics import mean_interval
 
@@ -32,8 +36,49 @@ AFTERMATH = 1.0
 """Time after the end of its consumption for which a shortfall is still the event's [s]."""
 
 
-class ConsumptionEvents:
-    """Accumulates the events of n episodes, period by period, in constant memory.
+METER = np.dtype((np.record, [(name, np.float64) for name in (
+    "periods", "switchings", "vented", "coil_energy", "episode_return", "failed",
+    "counted", "excursion", "breakdown", "squares", "low_time", "recovery",  # after the settling time
+    "consuming", "open", "age", "quiet", "depth", "dip", "recovered",  # of the event under way
+    "events", "depths", "recoveries", "longest",
+)]))  # fmt: skip
+"""What is counted of one episode [g, J, bar, s]; zeros: nothing yet."""
+
+
+@exact
+def count(m, figures, i, coil_energy, period, settling_time):
+    """Take in one period of an episode, column i of its step's figures (epv_env/result.py).
+
+    An episode ends with the period in which its circuit empties: that period counts, with its one charge
+    for the failure, and no later one does. An accelerator compiles this function, too.
+
+    m: a record of METER. coil_energy: of the coil so far [J]. period: control period [s]. settling_time:
+    time from which pressures count [s].
+    """
+    if m.failed > 0.0:
+        return
+    m.periods += 1.0
+    m.switchings += figures[SWITCHINGS, i]
+    m.vented += 1e3 * figures[VENTED, i]
+    m.coil_energy = coil_energy
+    m.episode_return += figures[REWARD, i]
+    m.failed = figures[FAILED, i]
+    if m.periods * period <= settling_time:
+        return
+    deviation = figures[DEVIATION, i]
+    shortfall = max(-deviation, 0.0)
+    m.counted += 1.0
+    m.excursion = max(m.excursion, abs(deviation))
+    m.breakdown = max(m.breakdown, shortfall)
+    m.squares += deviation * deviation
+    m.low_time = m.low_time + period if shortfall > SHORTFALL_BAR else 0.0
+    m.recovery = max(m.recovery, m.low_time)
+    _follow_events(m, 1e3 * figures[CONSUMPTION, i] > EVENT_FLOW, shortfall, period)
+
+
+@exact
+def _follow_events(m, consuming, shortfall, period):
+    """Take in whether a period belongs to an application, and its largest shortfall [bar].
 
     An event begins with the period in which consumption rises above EVENT_FLOW. It ends where the next
     one begins, or AFTERMATH after consumption has fallen below again, or with the episode. Its breakdown
@@ -41,61 +86,46 @@ class ConsumptionEvents:
     above target - SHORTFALL_BAR after the first dip below, or to the event's end if that comes first;
     0 if no dip begins within ONSET.
     """
+    if consuming and m.consuming == 0.0:
+        _end_event(m)
+        m.open = 1.0
+        m.events += 1.0
+    m.consuming = 1.0 if consuming else 0.0
+    m.age += period
+    m.quiet = 0.0 if consuming else m.quiet + period
+    m.depth = max(m.depth, shortfall)
+    low = shortfall > SHORTFALL_BAR and m.recovered == 0.0 and (m.dip > 0.0 or m.age <= ONSET)
+    if low:
+        m.dip = m.age
+    elif m.dip > 0.0:
+        m.recovered = 1.0
+    if m.quiet >= AFTERMATH:
+        _end_event(m)
 
-    def __init__(self, n: int, period: float):
-        """n: number of episodes. period: control period [s]."""
-        self._period = period
-        self._open = np.zeros(n, dtype=bool)
-        self._consuming = np.zeros(n, dtype=bool)
-        self._age = np.zeros(n)
-        self._quiet = np.zeros(n)
-        self._depth = np.zeros(n)
-        self._recovery = np.zeros(n)
-        self._recovered = np.zeros(n, dtype=bool)
-        self._count = np.zeros(n)
-        self._depths = np.zeros(n)
-        self._recoveries = np.zeros(n)
-        self._longest = np.zeros(n)
 
-    def update(self, consumption: NDArray, shortfall: NDArray) -> None:
-        """Take in one period: mean consumption [g/s] and largest shortfall, 0 or more [bar], (n,)."""
-        consuming = consumption > EVENT_FLOW
-        begins = consuming & ~self._consuming
-        self._consuming = consuming
-        self._close(begins)
-        self._open |= begins
-        self._count += begins
+@exact
+def _end_event(m):
+    """Add the event under way, if there is one, to the others."""
+    if m.open > 0.0:
+        m.depths += m.depth
+        m.recoveries += m.dip
+        m.longest = max(m.longest, m.dip)
+    m.open = m.age = m.depth = m.dip = m.recovered = 0.0
 
-        self._age += self._period
-        self._quiet = np.where(consuming, 0.0, self._quiet + self._period)
-        self._depth = np.maximum(self._depth, shortfall)
-        answer = (self._recovery > 0) | (self._age <= ONSET)
-        low = (shortfall > SHORTFALL_BAR) & answer & ~self._recovered
-        self._recovered |= ~low & (self._recovery > 0)
-        self._recovery = np.where(low, self._age, self._recovery)
-        self._close(self._quiet >= AFTERMATH)
 
-    def _close(self, where: NDArray) -> None:
-        """End the events among `where` that are open, and forget what was gathered there."""
-        ended = where & self._open
-        self._depths += ended * self._depth
-        self._recoveries += ended * self._recovery
-        self._longest = np.where(ended, np.maximum(self._longest, self._recovery), self._longest)
-        self._open &= ~where
-        for figure in (self._age, self._depth, self._recovery):
-            figure[where] = 0.0
-        self._recovered[where] = False
+def _loop(digest: str) -> Any:
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def count_all(meters, figures, coil_energy, period, settling_time):
+        if digest == "":
+            return
+        for i in range(len(meters)):
+            count(meters[i], figures, i, coil_energy[i], period, settling_time)
 
-    def result(self) -> dict[str, NDArray]:
-        """The figures of events in EpisodeMetrics, (n,), so far; events under way end here."""
-        count = np.maximum(self._count, 1)
-        under_way = self._open
-        return {
-            "events": self._count.copy(),
-            "event_breakdown_bar": (self._depths + under_way * self._depth) / count,
-            "event_recovery_s": (self._recoveries + under_way * self._recovery) / count,
-            "longest_event_recovery_s": np.maximum(self._longest, under_way * self._recovery),
-        }
+    return count_all
+
+
+count_all = _loop(source_digest())
+"""`count` of n episodes: meters (n,), figures (N_FIGURE, n), coil_energy (n,)."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -129,6 +159,26 @@ class EpisodeMetrics:
     episode_return: NDArray
     """Sum of rewards."""
 
+    @classmethod
+    def of(cls, m: NDArray, period: float) -> "EpisodeMetrics":
+        """Of records of METER (n,); events under way end here. period: control period [s]."""
+        time, events = m["periods"] * period, np.maximum(m["events"], 1)
+        return cls(
+            stayed=(m["excursion"] <= BAND_BAR) & (m["failed"] == 0),
+            excursion_bar=m["excursion"],
+            breakdown_bar=m["breakdown"],
+            recovery_s=m["recovery"],
+            events=m["events"],
+            event_breakdown_bar=(m["depths"] + m["open"] * m["depth"]) / events,
+            event_recovery_s=(m["recoveries"] + m["open"] * m["dip"]) / events,
+            longest_event_recovery_s=np.maximum(m["longest"], m["open"] * m["dip"]),
+            rms_bar=np.sqrt(m["squares"] / np.maximum(m["counted"], 1)),
+            switchings_per_s=m["switchings"] / time,
+            vented_g_per_s=m["vented"] / time,
+            coil_W=m["coil_energy"] / time,
+            episode_return=m["episode_return"],
+        )
+
     def __len__(self) -> int:
         return len(self.stayed)
 
@@ -141,89 +191,6 @@ class EpisodeMetrics:
         """The episodes of all parts, one after another."""
         return cls(
             **{f.name: np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)}
-        )
-
-
-class Meter:
-    """Accumulates the metrics of n episodes, period by period, in constant memory.
-
-    An episode ends with the period in which its circuit empties: that period counts, with its one charge
-    for the failure, and no later one does.
-    """
-
-    def __init__(self, n: int, period: float, settling_time: float):
-        """
-        Args:
-            n: number of episodes.
-            period: control period [s].
-            settling_time: time from which pressures count [s].
-        """
-        self._period = period
-        self._settling_time = settling_time
-        self._steps = 0
-        self._periods = np.zeros(n, dtype=np.int64)
-        self._counted = np.zeros(n, dtype=np.int64)
-        self._highest = np.full(n, -np.inf)
-        self._lowest = np.full(n, np.inf)
-        self._squares = np.zeros(n)
-        self._low_time = np.zeros(n)
-        self._longest_low = np.zeros(n)
-        self._switchings = np.zeros(n)
-        self._vented = np.zeros(n)
-        self._return = np.zeros(n)
-        self._failed = np.zeros(n, dtype=bool)
-        self._events = ConsumptionEvents(n, period)
-
-    def update(self, reward: NDArray, failed: NDArray, info: dict[str, NDArray]) -> None:
-        """Take in one period of every episode.
-
-        Args:
-            reward: (n,).
-            failed: whether the circuit has emptied (n,), bool.
-            info: arrays (n,) by name (epv_env.result).
-        """
-        self._steps += 1
-        runs = self.running
-        self._periods += runs
-        self._switchings += np.where(runs, info["switchings"], 0)
-        self._vented += np.where(runs, info["vented_g"], 0.0)
-        self._return += np.where(runs, reward, 0.0)
-        self._failed |= failed
-        if self._steps * self._period <= self._settling_time:
-            return
-        self._counted += runs
-        deviation = np.where(runs, info["deviation_bar"], 0.0)
-        self._highest = np.maximum(self._highest, deviation)
-        self._lowest = np.minimum(self._lowest, deviation)
-        self._squares += deviation**2
-        self._low_time = np.where(deviation < -SHORTFALL_BAR, self._low_time + self._period, 0.0)
-        self._longest_low = np.maximum(self._longest_low, self._low_time)
-        consumption = np.where(runs, info["consumption_g_per_s"], 0.0)
-        self._events.update(consumption, np.maximum(-deviation, 0.0))
-
-    @property
-    def running(self) -> NDArray:
-        """Whether an episode goes on, its circuit not having emptied yet, boolean (n,)."""
-        return ~self._failed
-
-    def result(self, coil_energy: NDArray | float = 0.0) -> EpisodeMetrics:
-        """The metrics so far.
-
-        coil_energy: electrical energy of each coil from the start to its episode's end, (n,) [J].
-        """
-        excursion = np.maximum(self._highest, -self._lowest)
-        time = self._periods * self._period
-        return EpisodeMetrics(
-            stayed=(excursion <= BAND_BAR) & ~self._failed,
-            excursion_bar=excursion,
-            breakdown_bar=np.maximum(-self._lowest, 0.0),
-            recovery_s=self._longest_low,
-            **self._events.result(),
-            rms_bar=np.sqrt(self._squares / np.maximum(self._counted, 1)),
-            switchings_per_s=self._switchings / time,
-            vented_g_per_s=self._vented / time,
-            coil_W=np.broadcast_to(coil_energy, excursion.shape) / time,
-            episode_return=self._return,
         )
 
 

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 import epv_env  # noqa: F401 - registers the ids
 from controllers.base import Controller, Privileged
-from epv_env.result import step_info
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
-from training.evaluation.metrics import EpisodeMetrics, Meter
+from training.evaluation.metrics import METER, EpisodeMetrics, count_all
 from training.evaluation.seeds import TIMING_SEED
 
 WARM_UP_DECISIONS = 50
@@ -59,7 +58,7 @@ def begin_episodes(
 def run_episodes(
     controller: Controller,
     *,
-    seeds: list[int],
+    seeds: Sequence[int],
     duration: float,
     options: dict[str, Any],
     restart_s: float | None = None,
@@ -81,12 +80,10 @@ def run_episodes(
     """
     env = make_env(controller, len(seeds), **options)
     observation = begin_episodes(env, controller, seeds)
-    energy_before = env.coil_energy.copy()
-    energy = energy_before.copy()
     own: Any = env.unwrapped
     period = own.settings.control_period
     steps = round(duration / period)
-    meter = Meter(len(seeds), period, own.settings.settling_time)
+    meters = np.zeros(len(seeds), METER)
     restart = None if restart_s is None else round(restart_s / period)
     for step in range(steps):
         if step == restart and not isinstance(controller, Privileged):
@@ -94,12 +91,11 @@ def run_episodes(
         action = controller.act(observation)
         result = env.advance(action)
         observation = result.observation
-        np.copyto(energy, env.coil_energy, where=meter.running)
-        meter.update(result.reward, result.failed, step_info(result))
+        count_all(meters, result.figures, env.coil_energy, period, own.settings.settling_time)
         if step % 50 == 0:
             progress(step / steps)
     progress(1.0)
-    return meter.result(energy - energy_before)
+    return EpisodeMetrics.of(meters, period)
 
 
 def decision_times(

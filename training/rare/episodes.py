@@ -21,6 +21,7 @@ from epv_env.period import NOISE_BLOCK
 from epv_env.plant.channels import MEASURED
 from epv_env.result import DEVIATION
 from epv_env.settings import Settings
+from epv_env.task import LimitingTask
 from training.evaluation.rollout import make_env
 from training.rare.splitting import Moves
 
@@ -71,6 +72,8 @@ class Episodes:
     """Of an episode [s]."""
     options: dict[str, Any]
     """Of the environment; no conditions."""
+    device: str = "cpu"
+    """On which they run: "cpu", or "cuda" for an accelerator."""
 
     @property
     def settings(self) -> Settings:
@@ -101,6 +104,8 @@ class Episodes:
         """
         env = make_env(self.controller, len(normals), threads=1, **self.options)
         observation = env.task.begin_from(np.arange(len(normals)), self.starts(normals))
+        if self.device != "cpu":
+            return self._worst_on_device(env.task, normals)
         controller: Any = deepcopy(self.controller)
         controller.reset(len(normals))
         if isinstance(controller, Privileged):
@@ -113,6 +118,17 @@ class Episodes:
                 worst = np.maximum(worst, np.abs(result.figures[DEVIATION]))
             worst[result.failed] = np.inf
         return worst
+
+    def _worst_on_device(self, task: LimitingTask, normals: NDArray) -> NDArray:
+        """`worst` of episodes that have begun. Raises OptionError for a controller of the host."""
+        from training.evaluation import on_device  # compiles for an accelerator: of no use elsewhere
+
+        noise = normals[:, PLANT + DISTURBANCE :].reshape(len(normals), -1, len(MEASURED))
+        m = on_device.run_begun(
+            self.controller, on_device.Batch.of(task), task.settings,
+            periods=round(self.duration / task.period), noise=noise,
+        )  # fmt: skip
+        return np.where(m["failed"] > 0, np.inf, m["excursion"])
 
     def described(self, normals: NDArray) -> list[dict[str, Any]]:
         """What makes the episodes of these normals (n, numbers), ready for JSON.

@@ -27,17 +27,12 @@ from identification.valve_gap.causes import PARAMETER_COMPONENTS
 NAMING_VERDICTS = ("known", "ambiguous", "partial")
 """Verdicts that name a cause."""
 
-LEAST_INCLUSION = 0.01
-"""Least probability of an effect that counts as a statement about it [-]: below lie thousands of effects
-that nobody would look at, whose truth would drown the rest."""
-
 BINS = 10
-"""Of a reliability diagram [-]: with 300 answers the fullest ones still have narrow intervals."""
+"""Of the calibration error [-]: with 300 answers the fullest ones still have narrow intervals."""
 
-FIRST, INCLUSION = "first cause", "inclusion of an effect"
-"""Statements whose probabilities are compared with what was true: the first listed cause, where the
-verdict names a cause, and each effect of at least LEAST_INCLUSION. Without a right cause (no effect,
-effect struck) every answer is wrong."""
+FIRST = "first cause"
+"""Statement whose probability is compared with what was true, where the verdict names a cause. Without
+a right cause (no effect, effect struck) every answer is wrong."""
 
 
 def score_trial(label: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -> dict[str, Any]:
@@ -66,11 +61,6 @@ def score_trial(label: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -
         "component": component,
         "component_right": component in {component_of(cause) for cause in label["visible"]},
         FIRST: [[c["probability"], is_true(label, c["effects"])] for c in listed],
-        INCLUSION: [
-            [probability, name in label["effects"]]
-            for name, probability in said.get("inclusion", {}).items()
-            if probability >= LEAST_INCLUSION
-        ],
         "seconds": said.get("seconds"),
     }
     return score | {"well_judged": is_well_judged(score)}
@@ -199,28 +189,16 @@ def figures(trials: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
         "False effect held": share(t["false_held"] for t in trials),
         "Diagnosis failed": share(t["verdict"] == "failed" for t in trials),
         "Mean probability on the truth": mean([t["probability"] for t in caused]),
-        "Calibration error of the first cause": calibration_error(*answers(trials, FIRST)),
+        "Calibration error of the first cause": calibration_error(*answers(trials)),
         "Mean size of the ambiguity set": mean([t["set_size"] for t in caused if t["set_size"]]),
         "Seconds per diagnosis": mean([t["seconds"] for t in trials if t["seconds"] is not None]),
     }
 
 
-def answers(trials: Sequence[Mapping[str, Any]], statement: str) -> tuple[NDArray, NDArray]:
-    """Stated probability of each answer, and whether it is true, (answers,) each."""
-    given = np.array([answer for trial in trials for answer in trial[statement]], float).reshape(-1, 2)
+def answers(trials: Sequence[Mapping[str, Any]]) -> tuple[NDArray, NDArray]:
+    """Stated probability of each first cause, and whether it is true, (answers,) each."""
+    given = np.array([answer for trial in trials for answer in trial[FIRST]], float).reshape(-1, 2)
     return given[:, 0], given[:, 1]
-
-
-def reliability(probability: NDArray, right: NDArray) -> list[dict[str, Any]]:
-    """Bins of equal width that hold an answer: mean `probability`, and `right` as `share` gives it.
-
-    probability, right: of each answer, (answers,).
-    """
-    number = _bin(probability)
-    return [
-        {"probability": float(np.mean(probability[number == k])), "right": share(right[number == k])}
-        for k in np.unique(number)
-    ]
 
 
 def expected_calibration_error(probability: NDArray, right: NDArray) -> float:

@@ -3,8 +3,8 @@
     python -m docs.studies.blind.study --seed 7
 
 draws truths, records campaigns on a bench of its own, commits to the truths, diagnoses the campaigns
-blind, and only then opens the truths and scores. It writes results-FORMS.json, reliability-FORMS.png and
-a table of README.md. Trials are kept in runs/blind/FORMS-SEED and not repeated:
+blind, and only then opens the truths and scores. It writes results-FORMS.json and a
+table of README.md. Trials are kept in runs/blind/FORMS-SEED and not repeated:
 
     NNNN/campaign/          all that the diagnosis gets
     NNNN/sealed.json        the truth
@@ -22,12 +22,11 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from threadpoolctl import threadpool_limits
 
 from docs.studies.blind.bench import SUITE, blind_campaign, true_recordings
 from docs.studies.blind.explainable import explainable_gap
-from docs.studies.blind.score import FIRST, INCLUSION, answers, figures, reliability, score_trial
+from docs.studies.blind.score import figures, score_trial
 from docs.studies.blind.truth import (
     EXCLUDED_EFFECT,
     FORM_DEVIATIONS,
@@ -226,22 +225,6 @@ def rows(found: Mapping[str, Mapping[str, Any]], forms: str) -> list[list[str]]:
     return cells
 
 
-def reliability_figure(bins: Mapping[str, Sequence[Mapping[str, Any]]]) -> Figure:
-    """Share that came true over the stated probability, by statement, with its exact 95 % interval."""
-    figure = Figure(figsize=(8, 4), layout="constrained")
-    for axes, (name, statements) in zip(figure.subplots(1, 2, sharey=True), bins.items(), strict=True):
-        axes.plot([0, 1], [0, 1], color="black", linestyle=":")
-        for bin_ in statements:
-            right, x = bin_["right"], bin_["probability"]
-            axes.plot([x, x], [right["low"], right["high"]], color="C0", marker="_")
-            axes.plot(x, right["value"], "C0o")
-            axes.annotate(str(right["of"]), (x, right["value"]), (5, 3), textcoords="offset points")
-        axes.set(title=name, xlabel="stated probability", xlim=(-0.03, 1.06), ylim=(-0.03, 1.06))
-        axes.grid(alpha=0.3)
-    figure.axes[0].set_ylabel("share that is true")
-    return figure
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
@@ -260,10 +243,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     folder = options.work / f"{forms}-{seed}"
     found = scores(folder, trials=count, seed=seed, forms=forms, suite=suite)
     counted = figures(found)
-    bins = {name: reliability(*answers(found, name)) for name in (FIRST, INCLUSION)}
-    results = {"seed": seed, "forms": forms, "figures": counted, "calibration": bins, "each": found}
+    results = {"seed": seed, "forms": forms, "figures": counted, "each": found}
     write_json(options.out / f"results-{forms}.json", results, allow_nan=False)
-    reliability_figure(bins).savefig(options.out / f"reliability-{forms}.png", dpi=100)
     heads = ("Measured", "Result (95 % interval)", "Asked")
     part = f"Seed {seed}, {count} trials.\n\n{table(heads, rows(counted, forms))}"
     fill(options.out / PAGE, {forms: part})

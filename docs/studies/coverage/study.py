@@ -2,7 +2,7 @@
 
     python -m docs.studies.coverage.study
 
-writes coverage.json, coverage.png and the table of README.md. The truth of each virtual campaign is
+writes coverage.json and the table of README.md. The truth of each virtual campaign is
 Table 12; its noise is its own. Finished campaigns are kept in runs/coverage and not repeated.
 """
 
@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 from scipy.stats import binomtest, chi2
 from threadpoolctl import threadpool_limits
@@ -105,25 +104,6 @@ def coverage(campaigns: Sequence[Mapping[str, Any]]) -> dict[str, dict[str, floa
     return shares
 
 
-def distance_quantiles(campaigns: Sequence[Mapping[str, Any]]) -> Figure:
-    """Squared distances of the truth against the quantiles of the chi-square law they should follow."""
-    figure = Figure(figsize=(5.5, 4.5), layout="constrained")
-    axes = figure.subplots()
-    count, degrees = len(campaigns), len(campaigns[0]["symbols"])
-    expected = chi2.ppf((np.arange(count) + 0.5) / count, degrees)
-    for name, label in (
-        ("distance", "region of the plant file"),
-        ("independent", "independent residuals"),
-    ):
-        axes.plot(expected, np.sort([c[name] for c in campaigns]), ".", label=label)
-    axes.plot(expected, expected, color="black", linewidth=0.8)
-    axes.set_xlabel(f"quantiles of chi-square with {degrees} degrees of freedom")
-    axes.set_ylabel("squared distance of the truth")
-    axes.legend()
-    axes.grid(alpha=0.3)
-    return figure
-
-
 @cache
 def _truths() -> list[TrueSignals]:
     """The noise-free recordings of the report's tests, the same for all campaigns."""
@@ -144,7 +124,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     found = calibrated_campaigns(options.work / "coverage.jsonl", campaigns=count, seed=options.seed)
     shares = coverage(found)
     write_json(options.out / "coverage.json", shares)
-    distance_quantiles(found).savefig(options.out / "coverage.png", dpi=100)
     rows = [
         [name, *(f"{100 * value:.1f}" for value in held.values())]
         for name, held in shares.items()

@@ -1,19 +1,22 @@
-"""Check the environments on an accelerator against the CPU, then time them.
+"""Check what runs on an accelerator against the CPU, then time it.
 
-    python -m docs.studies.device.study
+    python -m docs.studies.device.study [--only checks episodes ...]
 
-writes figures.json and the tables of README.md. Nothing is timed before it has agreed with the CPU.
-Without an accelerator numba's simulator shows that the script works; its times mean nothing:
+Each part writes its figures to figures.json, and its table to README.md, as it ends. Nothing is timed
+after checks that disagree. Without an accelerator numba's simulator shows that the script works; its
+times mean nothing:
 
     NUMBA_ENABLE_CUDASIM=1 NUMBA_DISABLE_JIT=1 python -m docs.studies.device.study --quick
 """
 
 import json
 import os
+import pickle
 import subprocess
 import sys
 import time
 from collections.abc import Callable, Sequence
+from copy import deepcopy
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -21,169 +24,213 @@ from typing import Any
 import gymnasium
 import numpy as np
 from numba import cuda
+from numpy.typing import NDArray
 
 import epv_env  # noqa: F401 - registers the ids
+from controllers.policy import load_policy
+from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.files import write_text
+from epv_env.device.kernels import P2, Batch
 from epv_env.device.vector_env import SIMULATED
+from training.evaluation.metrics import METER, count_all
+from training.evaluation.on_device import NEVER, run_begun
+from training.evaluation.rollout import begin_episodes, make_env
 
 FOLDER = Path(__file__).parent
 WITHIN_MBAR = 1e-6
 """Greatest difference of p2 from the CPU."""
-PERIOD = 5e-3
-CONDITIONS = ("ordinary", "broad")
+PERIOD, SEED = 5e-3, 7
+CONDITIONS = {"conditions": "broad", "sensor_noise": 0.0}
+LOOPS = {"random switching": False, "closed loop": True}
 SIMULATOR = ("NUMBA_ENABLE_CUDASIM", "NUMBA_DISABLE_JIT")
 """Settings of the simulator in a process's environment."""
-COMMANDS = ("sweep.py --designs regions --joint-episodes 65536",)
-"""Commands of training/ that are timed as a whole, with --device cuda."""
+SWEEP = (
+    "epv sweep --designs regions --controllers PPO 'extrapolating hysteresis' --joint-episodes 131072 "
+    "--device cuda --out "
+)
+"""A million episodes of 10 s: four regions under two controllers."""
 
 
-def made(n: int, conditions: str, device: str, **options: Any) -> Any:
-    """Environments of n valves, and their reset with a fixed seed."""
-    envs = gymnasium.make_vec("EPValve-v0", num_envs=n, device=device, conditions=conditions, **options)
-    return envs, envs.reset(seed=7)[0]
+def controllers() -> dict[str, Any]:
+    """Those of the comparison that decide in a compiled function."""
+    names = ("extrapolating hysteresis", "hysteresis", "adaptive pulse")
+    return {"PPO": load_policy(), **{name: tuned(name) for name in names}}
 
 
-def hysteresis(observation: np.ndarray) -> np.ndarray:
-    """Actions of a controller that switches at the target, (n,)."""
-    return (observation[:, 0] > 0.0).astype(np.int64)
-
-
-def p2(n: int, periods: int, conditions: str, closed: bool, device: str, **options: Any) -> np.ndarray:
-    """p2 under random switching or in a closed loop, without noise, (periods, n) [Pa]."""
-    fixed = {"sensor_noise": 0.0, "max_episode_steps": periods + 1, **options}
-    envs, observation = made(n, conditions, device, **fixed)
-    rng, found = np.random.default_rng(0), []
+def p2(n: int, periods: int, closed: bool, device: str) -> NDArray:
+    """p2 of an environment, switched at random or by a hysteresis, (periods, n) [Pa]."""
+    limit = {"max_episode_steps": periods + 1}
+    envs: Any = gymnasium.make_vec("EPValve-v0", num_envs=n, device=device, **limit, **CONDITIONS)
+    seen, rng, found = envs.reset(seed=SEED)[0], np.random.default_rng(0), []
     on = np.ones(n, dtype=bool)
     for _ in range(periods):
         on ^= rng.random(n) < 0.15
-        host = observation if device == "cpu" else observation.copy_to_host()
-        observation = envs.step(hysteresis(host) if closed else on.astype(np.int64))[0]
-        state = envs.task.valves.tables.state if device == "cpu" else envs._batch.state.copy_to_host()
-        found.append(state[0, :n].copy())
+        host = seen if device == "cpu" else seen.copy_to_host()
+        seen = envs.step(((host[:, 0] > 0.0) if closed else on).astype(np.int64))[0]
+        cpu = device == "cpu"
+        found.append(envs.task.valves.state.p2.copy() if cpu else envs._batch.numbers[P2].copy_to_host())
     return np.array(found)
 
 
-def p2_of_cpu(n: int, *case: Any) -> np.ndarray:
-    """`p2` on the CPU, in a process of its own: in the simulator's, nothing is compiled."""
-    code = "import json, sys; from docs.studies.device import study as s; "
-    code += "s.p2(*json.loads(sys.argv[1])).tofile(sys.argv[2])"
+def on_cpu(
+    controller: Any, seeds: Sequence[int], periods: int, restart: int = NEVER, **options: Any
+) -> tuple[NDArray, NDArray, dict[str, Any]]:
+    """Episodes under a controller: decisions and p2 [Pa], (periods, 2, n), what is counted, and the
+    arguments of `run_begun` for the same episodes."""
+    env: Any = make_env(controller, len(seeds), **options)
+    seen, settings = begin_episodes(env, controller, seeds), env.settings
+    arguments = {
+        "controller": controller, "settings": settings, "begun": deepcopy(Batch.of(env.task)),
+        "noise": env.task._noise.copy(),
+    }  # fmt: skip
+    record, meters = np.empty((periods, 2, len(seeds))), np.zeros(len(seeds), METER)
+    for k in range(periods):
+        if k == restart:
+            controller.reset(len(seeds))
+        record[k, 0] = controller.act(seen)
+        result = env.advance(record[k, 0])
+        seen, record[k, 1] = result.observation, env.task.valves.state.p2
+        count_all(
+            meters, result.figures, env.coil_energy, settings.control_period, settings.settling_time
+        )
+    return record, meters, arguments
+
+
+def on_host(n: int, periods: int) -> dict[str, Any]:
+    """What the CPU gives, by case."""
+    seeds = range(SEED, SEED + n)
+    return {loop: p2(n, periods, closed, "cpu") for loop, closed in LOOPS.items()} | {
+        name: on_cpu(each, seeds, periods, **CONDITIONS) for name, each in controllers().items()
+    }
+
+
+def from_host(n: int, periods: int) -> dict[str, Any]:
+    """`on_host` in a process of its own: in the simulator's, nothing is compiled."""
+    code = "import pickle, sys; from docs.studies.device import study; "
+    code += f"pickle.dump(study.on_host({n}, {periods}), open(sys.argv[1], 'wb'))"
     environment = {k: v for k, v in os.environ.items() if k not in SIMULATOR}
     with TemporaryDirectory() as folder:
-        file = str(Path(folder, "p2"))
-        command = [sys.executable, "-c", code, json.dumps([n, *case, "cpu"]), file]
-        subprocess.run(command, env=environment, check=True)
-        return np.fromfile(file).reshape(-1, n)
+        file = Path(folder, "cases")
+        subprocess.run([sys.executable, "-c", code, file], env=environment, check=True)
+        return pickle.loads(file.read_bytes())
 
 
-def differences(n: int, periods: int) -> list[dict[str, Any]]:
-    """Greatest difference of p2 between CPU and device [mbar], by case."""
+def checks(quick: bool) -> list[list[Any]]:
+    """By case: greatest difference of p2 from the CPU's [mbar], and number of other decisions.
+
+    Raises SystemExit if the device disagrees.
+    """
+    n, periods = (3, 12) if quick else (256, 400)
     rows = []
-    for conditions in CONDITIONS:
-        for closed in (False, True):
-            case = (n, periods, conditions, closed)
-            expected = p2_of_cpu(*case)
-            greatest = float(np.max(np.abs(p2(*case, "cuda") - expected)) / 100)
-            rows.append({"conditions": conditions, "closed": closed, "greatest_mbar": greatest})
+    for case, expected in from_host(n, periods).items():
+        if case in LOOPS:
+            others, difference = 0, np.abs(p2(n, periods, LOOPS[case], "cuda") - expected)
+        else:
+            record = np.zeros_like(expected[0])
+            arguments = expected[2] | {"noise": np.zeros((n, periods + 1, 4))}
+            run_begun(**arguments, periods=periods, record=record)
+            decisions, difference = np.abs(record - expected[0]).transpose(1, 0, 2)
+            others = int(decisions.sum())
+        rows.append([case, float(difference.max() / 100), others])
+    if worst := [row for row in rows if not row[1] <= WITHIN_MBAR or row[2]]:
+        raise SystemExit(f"the device disagrees with the CPU, nothing is timed: {worst}")
     return rows
 
 
-def policy_on_device(n: int) -> Callable[[Any], Any]:
-    """From observations to actions, both on the device: a network of 64 x 64."""
+def network() -> Callable[[Any], Any]:
+    """A user's own policy: from observations to actions on the device, by 64 x 64 neurons of torch."""
     import torch
 
-    layers: list[Any] = [
-        torch.nn.LazyLinear(64),
-        torch.nn.Tanh(),
-        torch.nn.Linear(64, 64),
-        torch.nn.Tanh(),
-    ]
-    network = torch.nn.Sequential(*layers, torch.nn.Linear(64, 2)).cuda()
-
-    def act(observation: Any) -> Any:
-        with torch.no_grad():
-            logits = network(torch.as_tensor(observation, device="cuda"))
-            return torch.distributions.Categorical(logits=logits).sample().to(torch.int64)
-
-    return act
+    layers: list[Any] = [torch.nn.LazyLinear(64), torch.nn.Tanh(), torch.nn.Linear(64, 64)]
+    net = torch.nn.Sequential(*layers, torch.nn.Tanh(), torch.nn.Linear(64, 2)).cuda()
+    return torch.no_grad()(lambda seen: net(torch.as_tensor(seen, device="cuda")).argmax(dim=1))
 
 
-def rate(n: int, periods: int, conditions: str, closed: bool) -> float:
-    """Simulated seconds a second with n valves."""
-    envs, observation = made(n, conditions, "cuda", max_episode_steps=2000)
-    fixed = cuda.to_device(np.random.default_rng(0).integers(0, 2, n))
-    act = policy_on_device(n) if closed and not SIMULATED else lambda _: fixed
-    begin = 0.0
-    for k in range(periods + 1):
-        if k == 1:  # the first compiles
-            cuda.synchronize()
-            begin = time.perf_counter()
-        observation = envs.step(act(observation))[0]
+def seconds(work: Callable[[], Any]) -> float:
+    """Time until the device has done it."""
     cuda.synchronize()
-    return n * periods * PERIOD / (time.perf_counter() - begin)
-
-
-def seconds_of(command: str) -> float:
-    """Time that a command of training/ takes on the device [s]."""
-    script, *words = command.split()
     begin = time.perf_counter()
-    with TemporaryDirectory() as folder:
-        more = ["--device", "cuda", "--out", str(Path(folder, "out"))]
-        subprocess.run([sys.executable, f"training/{script}", *words, *more], check=True)
+    work()
+    cuda.synchronize()
     return time.perf_counter() - begin
 
 
-def device_name() -> str:
-    """The accelerator in words."""
-    name = "simulator" if SIMULATED else cuda.get_current_device().name
-    return name.decode() if isinstance(name, bytes) else name  # by the version of numba-cuda
+def steps(quick: bool) -> list[list[Any]]:
+    """A launch a period: time of a step [ms], and simulated seconds a second."""
+    sizes, periods = ((2,), 2) if quick else ((1, 4096, 65_536, 262_144), 200)
+    rows = []
+    for n in sizes:
+        envs = gymnasium.make_vec("EPValve-v0", num_envs=n, device="cuda", max_episode_steps=2000)
+        ones = cuda.to_device(np.ones(n, dtype=np.int64))
+        acts = {"constant": lambda seen, ones=ones: ones} | ({} if SIMULATED else {"torch": network()})
+        for name, act in acts.items():
+            seen = [envs.reset(seed=SEED)[0]]
+
+            def run(count: int, act: Any = act, envs: Any = envs, seen: Any = seen) -> None:
+                for _ in range(count):
+                    seen[0] = envs.step(act(seen[0]))[0]
+
+            run(1)  # compiles
+            step = seconds(lambda run=run: run(periods)) / periods
+            rows.append([n, name, 1e3 * step, n * PERIOD / step])
+    return rows
+
+
+def episodes(quick: bool) -> list[list[Any]]:
+    """A launch for whole episodes: simulated seconds a second."""
+    sizes, periods, few = ((2,), 2, 2) if quick else ((4096, 65_536, 262_144), 400, 4096)
+    cases, rows = from_host(few, 1), []
+    for name in ("PPO", "extrapolating hysteresis"):
+        work = {k: v for k, v in cases[name][2].items() if k in ("controller", "settings")}
+        for n in sizes:
+            begun = Batch(*(np.tile(each, n // few) for each in cases[name][2]["begun"]))
+            run_begun(**work, begun=begun, periods=0)  # compiles
+            base, whole = (
+                seconds(lambda k=k, b=begun, work=work: run_begun(**work, begun=b, periods=k))
+                for k in (0, periods)
+            )
+            rows.append([name, n, n * periods * PERIOD / (whole - base)])
+    return rows
+
+
+def sweep(quick: bool) -> list[list[Any]]:
+    """Time of a command of a million episodes, from its start to its tables [s]."""
+    if quick:
+        return []
+    with TemporaryDirectory() as folder:
+        command = f"{sys.executable} -m training.{SWEEP}{folder}/out"
+        return [[SWEEP, seconds(lambda: subprocess.run(command, shell=True, check=True))]]
+
+
+PARTS: dict[str, tuple[Callable[[bool], list[list[Any]]], list[str]]] = {
+    "checks": (checks, ["case", "greatest difference of p2 [mbar]", "other decisions"]),
+    "steps": (steps, ["valves", "actions", "step [ms]", "simulated seconds a second"]),
+    "episodes": (episodes, ["controller", "episodes", "simulated seconds a second"]),
+    "sweep": (sweep, ["command", "time [s]"]),
+}
+"""What finds the rows of a table, and its headings, in the order in which they run."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the study; exit code 1 if the device disagrees with the CPU, before anything is timed."""
-    options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
+    """Run the parts."""
+    parser = study_parser(__doc__ or "", FOLDER)
+    parser.add_argument("--only", nargs="+", choices=PARTS, default=list(PARTS), help="these parts")
+    options = study_options(parser, arguments)
     if not cuda.is_available():
         raise SystemExit(
             "no accelerator here: run it on one, or in the simulator (see the file's docstring)"
         )
-    n, periods = (3, 12) if options.quick else (256, 400)
-    checked = differences(n, periods)
-    if worst := [row for row in checked if not row["greatest_mbar"] <= WITHIN_MBAR]:
-        print(f"the device disagrees with the CPU, nothing is timed: {worst}", file=sys.stderr)
-        return 1
-    sizes, steps = ((2,), 2) if options.quick else ((4096, 65_536, 262_144), 400)
-    timed = [
-        {"valves": size, "conditions": c, "closed": closed, "rate": rate(size, steps, c, closed)}
-        for size in sizes
-        for c in CONDITIONS
-        for closed in (False, True)
-    ]  # fmt: skip
-    commands = {} if options.quick else {command: seconds_of(command) for command in COMMANDS}
-    found = {"device": device_name(), "checked": checked, "timed": timed, "commands": commands}
-    write_text(options.out / "figures.json", json.dumps(found, indent=1) + "\n")
-    fill(options.out / PAGE, pages(found))
+    device = "simulator" if SIMULATED else cuda.get_current_device().name
+    path = options.out / "figures.json"
+    known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    for name in options.only:
+        find, headings = PARTS[name]
+        known |= {"device": str(device), name: find(options.quick)}
+        write_text(path, json.dumps(known, indent=1) + "\n")
+        rows = [[f"{x:,.3g}" if isinstance(x, float) else str(x) for x in row] for row in known[name]]
+        fill(options.out / PAGE, {"device": f"Measured on: {device}.", name: table(headings, rows)})
     return 0
-
-
-def pages(found: dict[str, Any]) -> dict[str, str]:
-    """The generated parts of the page."""
-    loops = {False: "random switching", True: "closed loop"}
-    checks = [
-        [row["conditions"], loops[row["closed"]], f"{row['greatest_mbar']:.1e}"]
-        for row in found["checked"]
-    ]
-    times = [
-        [f"{row['valves']:,}", row["conditions"], loops[row["closed"]],
-         f"{row['rate']:,.0f}"]
-        for row in found["timed"]
-    ]  # fmt: skip
-    commands = [[f"`{command}`", f"{seconds:.0f}"] for command, seconds in found["commands"].items()]
-    return {
-        "device": f"Measured on: {found['device']}.",
-        "checks": table(["conditions", "loop", "greatest difference of p2 [mbar]"], checks),
-        "rates": table(["valves", "conditions", "loop", "simulated seconds a second"], times),
-        "commands": table(["command with `--device cuda`", "time [s]"], commands),
-    }
 
 
 if __name__ == "__main__":

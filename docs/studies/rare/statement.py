@@ -67,16 +67,18 @@ def announced() -> Statement:
     return statement
 
 
-def batch(statement: Statement, region: str, first: int) -> dict[str, Any]:
-    """Figures of the episodes of BATCH seeds from `first` on."""
+def batch(
+    scenario: str, duration: float, levels: list[float], region: str, first: int
+) -> dict[str, Any]:
+    """Figures of the episodes of BATCH seeds from `first` on; levels: whose exceedances count [bar]."""
     metrics = run_episodes(
-        load_policy(), seeds=list(range(first, first + BATCH)), duration=statement.duration_s,
-        options={"threads": 1, "scenario": statement.scenario, "parameters": region},
+        load_policy(), seeds=list(range(first, first + BATCH)), duration=duration,
+        options={"threads": 1, "scenario": scenario, "parameters": region},
     )  # fmt: skip
     worst = np.argsort(metrics.excursion_bar)[: -WORST - 1 : -1]
     return {
         "left": (first + np.flatnonzero(~metrics.stayed)).tolist(),
-        "above": [int(np.sum(metrics.excursion_bar > level)) for level in statement.tail_bar],
+        "above": [int(np.sum(metrics.excursion_bar > level)) for level in levels],
         "worst": [[first + int(k), float(metrics.excursion_bar[k])] for k in worst],
     }
 
@@ -127,7 +129,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         for region in statement.regions
         for name, first in list(names(statement, region).items())[:count]
     ]
-    jobs = {name: partial(batch, statement, region, first) for name, region, first in seeds}
+    run = partial(batch, statement.scenario, statement.duration_s, statement.tail_bar)
+    jobs = {name: partial(run, region, first) for name, region, first in seeds}
     run_jobs(jobs, journal=journal, workers=options.workers, what="statement")
     text = page_table(statement, journal)
     fill(FOLDER / PAGE, {"statement": text})

@@ -1,23 +1,25 @@
-"""Compute the report's tables again, and check its printed figures against each other.
+"""Compute the report's tables again.
 
     python -m docs.studies.reproduction.study
 
-writes reproduce.json, a picture and the tables of README.md. The report is SCL-001/2003. Its
+writes reproduce.json and the tables of README.md. The report is SCL-001/2003. Its
 recordings were never published: Tables 2 to 4 and 10 to 15 come from a virtual bench whose truth is
 Table 12.
 """
 
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
-from docs.studies.reproduction.errata import ERRATUM, figure_checks
-from docs.studies.reproduction.sensitivity_tables import run_one_at_a_time, sensitivity_tables
+from docs.studies.reproduction.one_at_a_time import (
+    agreement_with_printed,
+    printed_sensitivities,
+    sensitivities,
+)
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import write_json
 from epv_env.plant.parameters import Parameters, confidence_intervals
@@ -29,7 +31,8 @@ from identification.pipeline.identification import Identification
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
 from identification.replay.replay import responses
-from identification.replay.response_blocks import errors_as_json, response_figure
+from identification.replay.response_blocks import errors_as_json
+from identification.sensitivity import studied_symbols
 
 FOLDER = Path(__file__).parent
 
@@ -42,10 +45,19 @@ def reproduce(identification: Identification) -> dict[str, Any]:
     campaign = identification.campaign
     quality = assess_recording(campaign.with_role("quality")[0], campaign.pressure)
     return {
-        **sensitivity_tables(run_one_at_a_time()),
+        **sensitivity_tables(),
         "virtual_bench": {"tables2to4": quality_json(quality), **_bench(identification)},
-        "slips": [asdict(check) for check in figure_checks()],
     }
+
+
+def sensitivity_tables() -> dict[str, Any]:
+    """JSON-ready 'table8' and 'table9' [%], and 'comparison' with the printed ones."""
+    rows = sensitivities(Parameters.nominal(), studied_symbols())
+    tables = {
+        f"table{number}": {s: rows[s].as_json() for s in printed_sensitivities(number)}
+        for number in (8, 9)
+    }
+    return {**tables, "comparison": agreement_with_printed(rows)}
 
 
 def _bench(identification: Identification) -> dict[str, Any]:
@@ -71,23 +83,16 @@ def page_parts(results: Mapping[str, Any]) -> dict[str, str]:
     return {
         "agreement": _agreement(results["comparison"]),
         "estimates": _estimates(results["virtual_bench"]),
-        "errata": _errata(results["slips"]),
     }
 
 
-def _agreement(comparison: Mapping[str, Any]) -> str:
-    rows = []
-    for title, key in (("fixed step of 0.5 ms", "fixed_step"), ("exact stops", "exact")):
-        found = comparison[key]
-        rows.append(
-            [
-                f"{title}, {found['U_on_V']:g} V",
-                f"{found['reproduced']} of {found['figures']}",
-                f"all but {', '.join(found['classes_differ'])}" if found["classes_differ"] else "all",
-                f"{found['worst_factor']:.3g}",
-            ]
-        )
-    return table(["", "Reproduced", "Classes as printed", "Farthest figure, factor"], rows)
+def _agreement(found: Mapping[str, Any]) -> str:
+    row = [
+        f"{found['reproduced']} of {found['figures']}",
+        f"all but {', '.join(found['classes_differ'])}",
+        f"{found['worst_factor']:.3g}",
+    ]
+    return table(["Reproduced", "Classes as printed", "Farthest figure, factor"], [row])
 
 
 def _estimates(bench: Mapping[str, Any]) -> str:
@@ -112,15 +117,6 @@ def _estimates(bench: Mapping[str, Any]) -> str:
     return table(["", "Start", "Truth", *METHODS, *widths], rows)
 
 
-def _errata(checks: Sequence[Mapping[str, str]]) -> str:
-    rows = [
-        [check["where"], check["printed"], check["recomputed"].partition(":")[0]]
-        for check in checks
-        if check["status"] == ERRATUM
-    ]
-    return table(["Where", "Printed", "Recomputed"], rows)
-
-
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
@@ -130,8 +126,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     results = reproduce(identification)
     write_json(options.out / "reproduce.json", results)
     fill(options.out / PAGE, page_parts(results))
-    picture = response_figure(identification.calibration.after[METHODS[0]][0])
-    picture.savefig(options.out / "calibration.png", dpi=100, bbox_inches="tight")
     return 0
 
 

@@ -33,18 +33,18 @@ from identification.bench.session import measured_campaign
 from identification.gap.report.gap_json import GAP
 from identification.recordings.campaign_files import FILE_NAME, write_campaign
 from identification.valve_gap.diagnose import PLANT, diagnose_campaign
-from training.evaluation.metrics import violation_interval
-from training.evaluation.plots import COLOURS, save_figure
-from training.evaluation.rollout import run_episodes
-from training.evaluation.seeds import EVALUATION_SEED
-from training.evaluation.statistics import paired_difference
-from training.studies.sim_to_real import (
+from training.commands.sim_to_real import (
     SCENARIO,
     alternatives,
     diagnosis_text,
     share_picture,
     trained,
 )
+from training.evaluation.metrics import violation_interval
+from training.evaluation.plots import COLOURS, save_figure
+from training.evaluation.rollout import run_episodes
+from training.evaluation.seeds import EVALUATION_SEED
+from training.evaluation.statistics import paired_difference
 
 FOLDER = Path(__file__).parent
 
@@ -274,7 +274,7 @@ def figures(name: Any, rows: pd.DataFrame) -> dict[str, Any]:
     return {
         "case": name[0], "arm": name[1], "seeds": len(by_seed), "left_percent": left, "left_low": low,
         "left_high": high, "rms_mbar": error, "switchings_per_s": often,
-        "cell": f"{left:.1f} ({low:.1f}–{high:.1f}), {error:.0f}, {often:.1f}",
+        "cell": f"{left:.1f} ({low:.1f}–{high:.1f})",
     }  # fmt: skip
 
 

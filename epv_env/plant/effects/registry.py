@@ -7,14 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.effects import (
-    armature,
     chambers,
     coil,
     flows,
-    friction,
     law,
     magnet,
     measurement,
+    movers,
     seats,
 )
 from epv_env.plant.effects.law import growth
@@ -29,16 +28,16 @@ EFFECTS: tuple[Effect, ...] = (
     coil.DRIVER_VOLTAGE_DROP,
     magnet.MAGNETIC_SATURATION,
     magnet.MAGNETIC_REMANENCE,
-    friction.ARMATURE_FRICTION,
-    armature.ARMATURE_BOUNCE,
-    armature.ARMATURE_PRESSURE_FORCE,
+    movers.ARMATURE_FRICTION,
+    movers.ARMATURE_BOUNCE,
+    movers.ARMATURE_PRESSURE_FORCE,
     seats.INLET_SEAT_LEAK,
     seats.EXHAUST_SEAT_LEAK,
     chambers.CONTROL_CHAMBER_HEAT,
     chambers.MOVING_CONTROL_VOLUME,
     flows.PRESSURE_DEPENDENT_DISCHARGE,
     flows.CRITICAL_PRESSURE_RATIO,
-    friction.PISTON_FRICTION,
+    movers.PISTON_FRICTION,
     flows.FLOW_FORCE,
     flows.LOCAL_GAS_SPEED,
     seats.SEAT_LEAK,

@@ -8,8 +8,8 @@ from numpy.typing import NDArray
 
 from epv_env.plant.effects import law
 from epv_env.plant.effects.coil import CLAMP_WIDTH, NO_CURRENT, OFF_VOLTAGE
-from epv_env.plant.effects.friction import SLIDING_SPEED_MV, SLIDING_SPEED_PV
 from epv_env.plant.effects.magnet import inverse_inductance
+from epv_env.plant.effects.movers import SLIDING_SPEED_MV, SLIDING_SPEED_PV
 from epv_env.plant.effects.record import Constant, Effect
 from epv_env.plant.primitives import inlined
 

@@ -14,7 +14,7 @@ from identification.gap.fit.evidence import predict
 from identification.gap.fit.laws import Law
 from identification.gap.locate.localisation import ForcingEstimate, MissingTerm
 from identification.gap.plant import GreyBox
-from identification.report.signals import over_time
+from identification.report.page import over_time
 
 QUANTILE = float(norm.ppf(0.5 + LEVEL / 2))
 """Half the width of a band [standard deviations]."""

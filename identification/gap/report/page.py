@@ -24,19 +24,17 @@ from identification.gap.report.gap_json import (
     parameter_intervals,
     remainder,
 )
-from identification.gap.report.quantities import (
+from identification.gap.report.sentences import (
+    Words,
+    at_an_end,
     gap_text,
     gap_with_interval,
+    in_words,
+    look_alikes,
     probability_text,
     quantity,
     quantity_with_interval,
     share_text,
-)
-from identification.gap.report.sentences import (
-    Words,
-    at_an_end,
-    in_words,
-    look_alikes,
     words_of,
 )
 from identification.report.page import ANSWERS, Block, Picture, Section, Table, Verdict

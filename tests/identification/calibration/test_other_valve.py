@@ -15,8 +15,7 @@ from identification.calibration.problem import CalibrationProblem, calibration_p
 from identification.calibration.search import weighted_least_squares
 from identification.confidence.covariance import estimate_covariance
 from identification.pipeline import identification
-from identification.recordings.recording import Campaign
-from identification.recordings.rules import rules_of
+from identification.recordings.recording import Campaign, rules_of
 
 HALF_SIZE = Path(__file__).parents[3] / "docs/examples/half_size/half-size.json"
 TRUE_VALUES = {"alphaMV": 0.66, "alphaPV": 0.33, "RML": 3.2e7, "R": 12.4}

@@ -6,9 +6,8 @@ import pytest
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration import search
-from identification.calibration.calibrate import calibrate, calibration_warnings
+from identification.calibration.calibrate import calibrate, calibration_section, calibration_warnings
 from identification.calibration.problem import calibration_problem
-from identification.calibration.section import calibration_section
 from tests.identification.twins import TRUE, calibration, freed, problem, twin
 
 START = Parameters.initial_guess()

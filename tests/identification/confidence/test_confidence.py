@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.confidence.confidence import assess_confidence
-from identification.confidence.section import confidence_section
+from identification.confidence.confidence import assess_confidence, confidence_section
 from tests.identification.confidence.results import twin_confidence
 from tests.identification.twins import TRUE, calibration, problem
 

@@ -3,7 +3,7 @@
 import pytest
 
 from identification.block_bootstrap import Interval
-from identification.gap.report.quantities import (
+from identification.gap.report.sentences import (
     gap_with_interval,
     probability_text,
     quantity,

@@ -14,10 +14,10 @@ from identification.gap.judge.held_out import NOMINAL
 from identification.gap.report.figures import comparison_figure
 from identification.gap.report.gap_json import as_json
 from identification.gap.report.page import calibrated_values, gap_table, ranking_table, sections
-from identification.gap.report.quantities import probability_text
 from identification.gap.report.sentences import (
     look_alikes,
     parameters_at_bounds,
+    probability_text,
     verdict_sentence,
     words_of,
 )

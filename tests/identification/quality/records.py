@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from docs.studies.reproduction.errata import TREND_OFFSETS
 from epv_env.plant.channels import SENSORS
 from identification.recordings.recording import CHANNELS, UNITS, Recording
+from tests.identification.quality.printed import TREND_OFFSETS
 
 PERIOD = 1 / 2000
 AMBIENT = 1e5

@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from docs.studies.reproduction.errata import (
+from epv_env.plant.channels import SENSORS
+from identification.recordings.recording import CHANNELS
+from tests.identification.quality.printed import (
     SAMPLES,
     STATISTICS,
     TREND_OFFSETS,
     TREND_SLOPES,
 )
-from epv_env.plant.channels import SENSORS
-from identification.recordings.recording import CHANNELS
 
 
 def chance_of_staying_below(factor):

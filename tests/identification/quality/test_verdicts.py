@@ -6,11 +6,11 @@ from functools import cache
 import numpy as np
 import pytest
 
-from docs.studies.reproduction.errata import STATISTICS, TREND_OFFSETS
 from epv_env.plant.channels import SENSORS
 from identification.quality.assessment import assess_recording, sensor_offsets, white_noise_band
-from identification.quality.verdicts import CHECKS, channel_verdict, check_results, worst_status
+from identification.quality.section import CHECKS, channel_verdict, check_results, worst_status
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
+from tests.identification.quality.printed import STATISTICS, TREND_OFFSETS
 from tests.identification.quality.records import (
     AMBIENT,
     PERIOD,

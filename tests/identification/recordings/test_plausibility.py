@@ -11,7 +11,7 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import REPORT_SUITE
 from identification.bench.session import run_bench
 from identification.quality.assessment import assess_recording
-from identification.quality.verdicts import check_results
+from identification.quality.section import check_results
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import Campaign, CampaignError, Recording
 

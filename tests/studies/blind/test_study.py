@@ -134,4 +134,3 @@ def test_the_short_form_writes_results_and_page(out):
     found = json.loads((out / "results-usual.json").read_text(encoding="utf-8"))
     assert [trial["number"] for trial in found["each"]] == [0, 1]
     assert f"Seed {SEED}, 2 trials." in (out / "README.md").read_text(encoding="utf-8")
-    assert (out / "reliability-usual.png").exists()

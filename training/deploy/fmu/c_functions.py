@@ -1,4 +1,9 @@
-"""C from the plant's compiled functions, so that the equations of an FMU are those of epv_env/plant."""
+"""C from the plant's functions, so that the equations of an FMU are those of epv_env/plant.
+
+Compiled functions are translated by their syntax. The NumPy formulas that fold parameters into the
+constants of the equations (epv_env/plant/coefficients.py, the `value` of an effect's Constant) have no
+branches but np.where: they are evaluated once on symbols that write down what is done.
+"""
 
 import ast
 import inspect
@@ -9,8 +14,9 @@ from dataclasses import dataclass, field
 from textwrap import dedent
 from typing import Any
 
-from training.deploy.fmu.formulas import Symbol, written
-from training.deploy.translation import Body, CFunction, Translation, Typed
+import numpy as np
+
+from training.deploy.translation import Body, CFunction, ExportError, Translation, Typed
 
 NUMBER, TRUTH = "double", "int"
 """C types of numbers and of truth values; the other types are structures, passed by their address."""
@@ -150,3 +156,44 @@ def field_texts(kind: type) -> dict[str, tuple[str, str]]:
             assert unit is not None, f"{kind.__name__}.{node.target.id} has no unit in its docstring"
             found[node.target.id] = ({"-": "1"}.get(unit[1], unit[1].split(" absolute")[0]), text)
     return found
+
+
+UFUNCS: dict[str, str] = {
+    "add": "({} + {})", "subtract": "({} - {})", "multiply": "({} * {})", "divide": "({} / {})",
+    "power": "pow({}, {})", "negative": "(-{})", "sqrt": "sqrt({})", "abs": "fabs({})",
+    "maximum": "greater({}, {})", "minimum": "lesser({}, {})",
+    "sign": "(double)(({0} > 0.0) - ({0} < 0.0))",
+    "less": "({} < {})", "less_equal": "({} <= {})", "greater": "({} > {})",
+    "greater_equal": "({} >= {})", "equal": "({} == {})", "not_equal": "({} != {})",
+}  # fmt: skip
+"""C by NumPy's name of an operation, element by element."""
+
+FUNCTIONS: dict[Callable[..., Any], str] = {np.where: "({} ? {} : {})", np.full_like: "{1}"}
+"""C by NumPy function."""
+
+
+@dataclass(frozen=True, eq=False)
+class Symbol(np.lib.mixins.NDArrayOperatorsMixin):
+    """A number that is known only when the FMU runs: its text in C."""
+
+    text: str
+
+    def __array_ufunc__(self, ufunc: np.ufunc, method: str, *inputs: Any, **_: Any) -> "Symbol":
+        if method != "__call__" or ufunc.__name__ not in UFUNCS:
+            raise ExportError(f"np.{ufunc.__name__} has no form in C: add it to {__name__}.UFUNCS")
+        return Symbol(UFUNCS[ufunc.__name__].format(*map(written, inputs)))
+
+    def __array_function__(self, function: Any, types: Any, inputs: Any, options: Any) -> "Symbol":
+        if function not in FUNCTIONS or options:
+            raise ExportError(f"np.{function.__name__} has no form in C: add it to {__name__}.FUNCTIONS")
+        return Symbol(FUNCTIONS[function].format(*map(written, inputs)))
+
+    def astype(self, kind: type) -> "Symbol":
+        """A truth value as a number."""
+        assert kind is float
+        return Symbol(f"(double){self.text}")
+
+
+def written(value: Any) -> str:
+    """A symbol or a number as C writes it."""
+    return value.text if isinstance(value, Symbol) else repr(float(value))

@@ -31,8 +31,15 @@ from epv_env.plant.stepping import (
 )
 from training.deploy.c_code import CODE, TITLE, filled
 from training.deploy.fmu.archive import TEMPLATES, Model, Variable
-from training.deploy.fmu.c_functions import HELPERS, NUMBER, TRUTH, PlantC, field_texts
-from training.deploy.fmu.formulas import Symbol, written
+from training.deploy.fmu.c_functions import (
+    HELPERS,
+    NUMBER,
+    TRUTH,
+    PlantC,
+    Symbol,
+    field_texts,
+    written,
+)
 
 LONGEST_STEP = 250e-6
 """Start of the parameter longest_step [s]: the integration step while a mover moves, the kernel's;

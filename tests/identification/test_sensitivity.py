@@ -1,5 +1,6 @@
 """Known columns have known collinearity; parameters that act by their ratio cannot be told apart."""
 
+import json
 from functools import cache
 
 import numpy as np
@@ -7,9 +8,11 @@ import pytest
 
 from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import Parameters, confidence_intervals, sensitive_symbols
+from identification import sensitivity
 from identification.recordings.recording import OUTPUTS, UNITS
 from identification.replay.model_inputs import ModelInputs
 from identification.replay.replay import Replay
+from identification.report.page import Table, write_page
 from identification.report_2003 import (
     CALIBRATION_CASES,
     CIRCUIT_PRESSURE,
@@ -17,15 +20,16 @@ from identification.report_2003 import (
     SAMPLING_RATE,
     SUPPLY_PRESSURE,
 )
-from identification.sensitivity import collinearity
-from identification.sensitivity.collinearity import (
+from identification.sensitivity import (
     CRITICAL_INDEX,
     OutputSensitivities,
     collinearity_index,
     cosines,
     sensitivities_on_recordings,
+    sensitivity_json,
+    sensitivity_section,
+    studied_symbols,
 )
-from identification.sensitivity.one_at_a_time import studied_symbols
 
 
 def sensitivities_in_cases() -> OutputSensitivities:
@@ -75,6 +79,22 @@ def test_the_calibrated_four_can_be_told_apart_but_not_all_sensitive_ones():
 def test_effects_do_not_depend_on_the_size_of_the_differences(monkeypatch):
     """The model is differentiable here: event times move smoothly with every parameter."""
     usual = nominal_sensitivities().effect
-    monkeypatch.setattr(collinearity, "DIFFERENCE_STEP", 1e-3)
+    monkeypatch.setattr(sensitivity, "DIFFERENCE_STEP", 1e-3)
     finer = sensitivities_in_cases()
     assert finer.effect == pytest.approx(usual, rel=0.01)
+
+
+def test_section_and_data(tmp_path):
+    section = sensitivity_section(nominal_sensitivities())
+    assert [verdict.status for verdict in section.verdicts] == ["good", "note"]
+    effects, pairs = section.blocks
+    assert isinstance(effects, Table)
+    assert isinstance(pairs, Table)
+    values = [float(value) for _, value in effects.rows]
+    assert values == sorted(values, reverse=True)
+    assert len(values) == len(studied_symbols())
+    rows = [(", ".join(sorted(pair.split(", "))), index) for pair, index in pairs.rows]
+    assert ("V2, alphaPV", "infinite") in rows
+    write_page(tmp_path / "page.html", title="Sensitivity", sections=[section])
+    data = json.loads(json.dumps(sensitivity_json(nominal_sensitivities()), allow_nan=False))
+    assert data["collinearity"]["all_sensitive"] is None

@@ -4,16 +4,17 @@ Every variant of the parameters runs the report's test cases. Its total error (e
 nominal model says how far the responses move.
 """
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from epv_env.plant.equations import State
 from epv_env.plant.parameters import table
-from epv_env.plant.simulate import Trajectory, energised, simulate
+from epv_env.plant.simulate import energised, simulate
 from identification.recordings.recording import OUTPUTS
 from identification.report_2003 import (
     CALIBRATION_CASES,
@@ -26,48 +27,34 @@ from identification.report_2003 import (
     total_error,
 )
 
+PRINTED: dict[str, Any] = json.loads(
+    Path(__file__).with_name("printed_2003.json").read_text(encoding="utf-8")
+)
+"""Tables that the report prints."""
+
 FACTORS = (0.9, 1.1)
 """The changes of Tables 8 and 9."""
 
 
-class Simulator(Protocol):
-    """`epv_env.plant.simulate.simulate`, or another numerical method for the same equations."""
+RELATIVE_AGREEMENT, ABSOLUTE_AGREEMENT = 0.1, 0.1
+"""A figure is reproduced if it differs from the printed one by at most this fraction of it, or by at
+most this many percentage points."""
 
-    def __call__(
-        self, p: Mapping[str, ArrayLike], *, initial: State, U: ArrayLike, period: float
-    ) -> Trajectory:
-        """States at the samples of U, which are `period` [s] apart."""
-        ...
+NOT_COUNTED = ("a1",)
+"""Its change is not printed: what it must have been is this project's guess."""
 
 
-def run_cases(
-    p: Mapping[str, ArrayLike],
-    U_on: float = ENERGISED_VOLTAGE,
-    simulator: Simulator = simulate,
-) -> list[Trajectory]:
-    """Each test case from the energised steady state, for all variants at once.
+def total_errors(p: Mapping[str, ArrayLike], U_on: float = ENERGISED_VOLTAGE) -> NDArray:
+    """Total error (eq. 21) of variants 1, 2, .. against variant 0, as fractions, (n - 1,).
 
     p: parameters by symbol [SI], arrays (n,). U_on: voltage that holds the armature [V]. Raises
     epv_env.plant.simulate.SimulationError.
     """
-    start = energised(p, p1=SUPPLY_PRESSURE, p2=CIRCUIT_PRESSURE, U=U_on)
-    return [
-        simulator(p, initial=start, U=case.voltage(U_on, SAMPLING_RATE), period=1 / SAMPLING_RATE)
-        for case in CALIBRATION_CASES
-    ]
-
-
-def total_errors(
-    p: Mapping[str, ArrayLike],
-    U_on: float = ENERGISED_VOLTAGE,
-    simulator: Simulator = simulate,
-) -> NDArray:
-    """Total error (eq. 21) of variants 1, 2, .. against variant 0, as fractions, (n - 1,).
-
-    p: parameters by symbol [SI], arrays (n,). Raises SimulationError.
-    """
     partials = []
-    for run in run_cases(p, U_on, simulator):
+    start = energised(p, p1=SUPPLY_PRESSURE, p2=CIRCUIT_PRESSURE, U=U_on)
+    for case in CALIBRATION_CASES:
+        U = case.voltage(U_on, SAMPLING_RATE)
+        run = simulate(p, initial=start, U=U, period=1 / SAMPLING_RATE)
         outputs = [np.asarray(getattr(run.state, name)) for name in OUTPUTS]  # (samples, n) each
         errors = [relative_error(y[:, 0], y[:, 1:], run.time) for y in outputs]
         partials.append(partial_error(errors))
@@ -99,9 +86,10 @@ class ErrorSensitivity:
         return {"minus10": minus, "plus10": plus, "sensitive": self.sensitive}
 
 
-def studied_symbols() -> list[str]:
-    """The parameters of Tables 6 and 7."""
-    return [symbol for symbol, row in table().items() if row.source in ("Table 6", "Table 7")]
+def printed_sensitivities(*tables: int) -> dict[str, tuple[float, float]]:
+    """Tables 8 and 9, or one of them: total errors for -10 % and +10 % by symbol [%]."""
+    rows = [row for table in tables or (8, 9) for row in PRINTED[f"table{table}"].items()]
+    return {symbol: (minus, plus) for symbol, (minus, plus) in rows}
 
 
 def changed_values(symbol: str, nominal: float) -> tuple[float, float]:
@@ -132,12 +120,36 @@ def sensitivities(
     symbols: Sequence[str],
     *,
     U_on: float = ENERGISED_VOLTAGE,
-    simulator: Simulator = simulate,
 ) -> dict[str, ErrorSensitivity]:
     """Total errors against the nominal model by symbol; all variants run in one batch."""
-    errors = total_errors(variants(nominal, symbols), U_on, simulator)
+    errors = total_errors(variants(nominal, symbols), U_on)
     pairs = errors.reshape(-1, 2).tolist()
     return {
         symbol: ErrorSensitivity(minus=minus, plus=plus)
         for symbol, (minus, plus) in zip(symbols, pairs, strict=True)
     }
+
+
+def agreement_with_printed(rows: Mapping[str, ErrorSensitivity]) -> dict[str, Any]:
+    """How a computation meets the printed tables, JSON-ready.
+
+    'figures' and 'reproduced' count figures, 'worst_factor' is the largest ratio of two, either way, and
+    'classes_differ' names the symbols, a1 among them, whose class is another.
+    """
+    printed = printed_sensitivities()
+    pairs = [
+        pair
+        for symbol in printed
+        if symbol not in NOT_COUNTED
+        for pair in zip(rows[symbol].percentages, printed[symbol], strict=True)
+    ]
+    return {
+        "figures": len(pairs),
+        "reproduced": sum(_is_reproduced(*pair) for pair in pairs),
+        "classes_differ": [s for s in printed if rows[s].sensitive != table()[s].sensitive],
+        "worst_factor": max(max(a / b, b / a) for a, b in pairs),
+    }
+
+
+def _is_reproduced(percent: float, printed: float) -> bool:
+    return abs(percent - printed) <= max(RELATIVE_AGREEMENT * printed, ABSOLUTE_AGREEMENT)

@@ -1,16 +1,18 @@
 """The report's sensitivity study comes back: Tables 8 and 9, without any measured data."""
 
+from dataclasses import replace
 from functools import cache
 
 import pytest
 
-from epv_env.plant.parameters import Parameters, table
-from identification.report_2003 import printed_sensitivities
-from identification.sensitivity.one_at_a_time import (
+from docs.studies.reproduction.one_at_a_time import (
+    agreement_with_printed,
     changed_values,
+    printed_sensitivities,
     sensitivities,
-    studied_symbols,
 )
+from epv_env.plant.parameters import Parameters, table
+from identification.sensitivity import studied_symbols
 
 PNEUMATIC = (
     "dMVexh", "R", "alphaMV", "V3", "cPV", "alphaPV", "V2", "dMVin", "d1", "d2", "xPV0", "xPVmax",
@@ -53,3 +55,13 @@ def test_other_conditions_give_other_figures():
     """The comparison can fail: at 24 V the armature's rows are far from the report's."""
     values = sensitivities(Parameters.nominal(), ["cMV"], U_on=24.0)["cMV"]
     assert 100 * values.minus < 0.6 * printed_sensitivities()["cMV"][0]
+
+
+def test_the_count_notices_another_figure_and_another_class():
+    met = agreement_with_printed(exact())
+    assert (met["figures"], met["classes_differ"]) == (46, ["RML"])
+    changed = exact() | {"d1": replace(exact()["d1"], minus=0.001, plus=0.001)}
+    other = agreement_with_printed(changed)
+    assert other["reproduced"] == met["reproduced"] - 2
+    assert set(other["classes_differ"]) == {"RML", "d1"}
+    assert other["worst_factor"] > 100

@@ -1,1 +1,0 @@
-"""Which parameters matter, and which the data cannot tell apart (section 5)."""
