@@ -256,10 +256,7 @@ def opening_pressure(p: Mapping[str, float], p1: NDArray, p2: NDArray) -> NDArra
 
 def _valves(p: Mapping[str, float], state: State, U_coil: float) -> Valves:
     """Valves in the given state (fields that broadcast to (n,)) under a constant voltage [V]."""
-    valves = Valves(np.size(state.p2))
-    valves.set_parameters(np.arange(valves.n), p)
-    for field, value in zip(valves.state, state, strict=True):
-        field[:] = value
+    valves = Valves.started(np.size(state.p2), p, state)
     valves.inputs.U[:] = U_coil
     return valves
 

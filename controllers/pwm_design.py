@@ -115,16 +115,6 @@ class Design:
     """Of the outer loop [degrees]."""
     crossover: float
     """Gain crossover [rad/s]."""
-    point: OperatingPoint
-    """Where the valve was linearised."""
-    period: float
-    """Of the PWM [s]."""
-
-    def __str__(self) -> str:
-        return (
-            f"gain margin {self.gain_margin:.2f}, phase margin {self.phase_margin:.0f} degrees, "
-            f"crossover {self.crossover:.1f} rad/s"
-        )
 
 
 def outer_loop(
@@ -182,7 +172,7 @@ def design(
             return Design(
                 inner_gain=inner_gain, outer_gain=float(gain), integral_time=integral_time,
                 duty=point.duty + lag / period,
-                gain_margin=margin, phase_margin=phase, crossover=crossover, point=point, period=period,
+                gain_margin=margin, phase_margin=phase, crossover=crossover,
             )  # fmt: skip
     raise ValueError(
         f"no gain keeps a phase margin of {phase_margin:g} degrees with an integral time of "

@@ -17,8 +17,14 @@ from epv_env.plant.parameters import Parameters
 from identification.calibration.calibrate import EXPLAINED
 from identification.calibration.problem import CalibrationProblem
 from identification.recordings.recording import OUTPUTS, CampaignError
-from identification.replay.replay import Response, responses
-from identification.replay.response_blocks import error_table, errors_as_json, percent, worst_picture
+from identification.replay.replay import (
+    Response,
+    error_table,
+    errors_as_json,
+    percent,
+    responses,
+    worst_picture,
+)
 from identification.report.page import Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR
 

@@ -1,6 +1,5 @@
 """What the documentation shows runs as printed, and its links and names lead somewhere."""
 
-import ast
 import importlib
 import json
 import os
@@ -19,7 +18,6 @@ pytestmark = pytest.mark.training
 
 from markdown.extensions.toc import slugify_unicode  # noqa: E402
 
-from docs.scripts import notebook  # noqa: E402
 from epv_env.common.commands import commands  # noqa: E402
 from epv_env.common.options import parse  # noqa: E402
 from epv_env.plant.plantfile import load_plant  # noqa: E402
@@ -184,30 +182,6 @@ def test_pages_are_short():
     assert {p: n for p, n in words.items() if p.startswith("docs/studies") and n > 1200} == {}
 
 
-def imported_packages(page: str) -> dict[str, set[str]]:
-    """Rows of the table of packages: what each may import."""
-    rows = re.findall(r"^\| `([\w.]+)` \|.*\| ([^|]*) \|$", text(page), re.M)
-    return {name: set(re.findall(r"`([\w.]+)`", may)) for name, may in rows}
-
-
-def test_the_page_of_the_architecture_says_who_imports_whom():
-    allowed = imported_packages("docs/architecture.md")
-    assert len(allowed) > 6
-
-    def group(name: str) -> str | None:
-        fitting = [g for g in allowed if f"{name}.".startswith(f"{g}.")]
-        return max(fitting, key=len, default=None)
-
-    for package in PACKAGES:
-        for path in (ROOT / package).rglob("*.py"):
-            own = group(".".join(path.relative_to(ROOT).with_suffix("").parts))
-            assert own is not None, path
-            nodes = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
-            names = {n.module for n in nodes if isinstance(n, ast.ImportFrom) and n.module}
-            others = {group(name) for name in names} - {own, None}
-            assert others <= allowed[own], f"{path} imports {others - allowed[own]}"
-
-
 def test_the_site_builds_without_a_warning(tmp_path):
     """A warning fails: a broken link, a page outside the navigation."""
     done = run(sys.executable, "-m", "mkdocs", "build", "--strict", "-d", tmp_path / "site", cwd=ROOT)
@@ -227,17 +201,15 @@ def test_the_site_builds_without_a_warning(tmp_path):
     assert example.lstrip().startswith('<div class="language-python highlight">')
 
 
-def test_the_notebook_prints_and_draws_what_it_shows():
-    """Its outputs are written by `python -m docs.scripts.notebook`."""
-    cells, again = notebook.read()["cells"], notebook.read()["cells"]
+def test_the_cells_of_the_notebook_run_and_print_what_it_shows():
+    cells = json.loads(text("docs/start/ten-cells.ipynb"))["cells"]
     assert len(cells) == 10
-    notebook.run(again)
-    assert [_shown(cell) for cell in again] == [_shown(cell) for cell in cells]
-    assert len(notebook.pictures()) == 4
-
-
-def _shown(cell: notebook.Cell) -> list[tuple[str, list[str]]]:
-    return [(output["output_type"], output.get("text", [])) for output in cell.get("outputs", [])]
+    outputs = [output for cell in cells for output in cell.get("outputs", [])]
+    assert sum(output["output_type"] == "display_data" for output in outputs) == 4
+    code = "\n".join("".join(cell["source"]) for cell in cells if cell["cell_type"] == "code")
+    done = run(sys.executable, "-c", code, cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "".join(line for output in outputs for line in output.get("text", []))
 
 
 def test_how_good_it_is_stands_behind_each_row():

@@ -12,8 +12,6 @@ import pytest
 from packaging.requirements import Requirement
 from packaging.utils import canonicalize_name
 
-from epv_env.common.extras import how_to_install
-
 ROOT = Path(__file__).parents[1]
 PROJECT = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
 OWN = ("epv_env", "controllers", "identification", "training", "tests", "docs")
@@ -126,11 +124,6 @@ def test_training_installs_only_its_extras_all_of_them_pinned():
     installed = {canonicalize_name(n) for names in packages_distributions().values() for n in names}
     assert len(brought) > 20
     assert brought & installed <= pinned
-
-
-def test_a_missing_package_is_installed_from_the_clone():
-    assert "pip install -e '.[identification]'" in how_to_install("identification")
-    assert "epv-valve[" not in how_to_install("identification")
 
 
 def test_pictures_and_films_can_be_installed_together():

@@ -1,37 +1,21 @@
-"""Imports point one way: plant <- env <- controllers, training; plant <- identification."""
+"""Imports point one way: as docs/architecture.md says, without a loop of folders, and nothing heavy."""
 
 import ast
+import re
 import subprocess
 import sys
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parents[1]
+PACKAGES = ("epv_env", "identification", "controllers", "training")
 HEAVY = ("torch", "stable_baselines3", "matplotlib", "pygame", "pandas")
-
-FORBIDDEN = {
-    "epv_env/common": (
-        "epv_env", "gymnasium", "controllers", "training", "identification", "torch", "pandas",
-    ),
-    "epv_env/plant": (
-        "epv_env", "gymnasium", "controllers", "training", "identification", *HEAVY,
-    ),
-    "epv_env": ("controllers", "training", "identification"),
-    "controllers": ("training",),
-    "identification": ("controllers", "training"),
-}  # fmt: skip
-"""What the files of a folder do not import."""
-
-ALLOWED = {
-    "epv_env/common": ("epv_env.common",),
-    "epv_env/plant": ("epv_env.plant", "epv_env.common"),
-}
-"""What they may import all the same."""
 
 
 def imported(source: str, package: str) -> set[str]:
-    """Absolute names of all modules that a file of a package imports, wherever in the file."""
+    """Absolute names of all that a file of a package imports, wherever in the file."""
     names = set()
     for node in ast.walk(ast.parse(source)):
         if isinstance(node, ast.Import):
@@ -43,33 +27,19 @@ def imported(source: str, package: str) -> set[str]:
     return names
 
 
-def belongs(name: str, packages: tuple[str, ...]) -> bool:
-    """Whether a module lies in one of the packages."""
-    return any(f"{name}.".startswith(f"{package}.") for package in packages)
+def files(root: Path) -> dict[str, Path]:
+    """Files of the packages by the name under which they are imported."""
+    paths = [path for package in PACKAGES for path in sorted((root / package).rglob("*.py"))]
+    names = [".".join(path.relative_to(root).with_suffix("").parts) for path in paths]
+    return {name.removesuffix(".__init__"): path for name, path in zip(names, paths, strict=True)}
 
 
-def offences(folder: str) -> list[str]:
-    """Imports of a folder's files that point the wrong way."""
-    found = []
-    for path in sorted((ROOT / folder).rglob("*.py")):
-        package = ".".join(path.relative_to(ROOT).parent.parts)
-        for name in sorted(imported(path.read_text(encoding="utf-8"), package)):
-            if belongs(name, FORBIDDEN[folder]) and not belongs(name, ALLOWED.get(folder, ())):
-                found.append(f"{path.relative_to(ROOT)} imports {name}")
-    return found
-
-
-@pytest.mark.parametrize("folder", FORBIDDEN)
-def test_imports_point_one_way(folder):
-    assert offences(folder) == []
-
-
-def test_only_the_adaptor_knows_stable_baselines3_and_torch():
-    files = [path for path in (ROOT / "epv_env").rglob("*.py") if path.name != "sb3.py"]
-    assert len(files) > 20
-    for path in files:
-        names = imported(path.read_text(encoding="utf-8"), "epv_env")
-        assert not any(belongs(name, ("torch", "stable_baselines3")) for name in names), path
+def imports(root: Path) -> dict[str, set[str]]:
+    """What each file of the packages imports, by its name."""
+    return {
+        name: imported(path.read_text("utf-8"), ".".join(path.relative_to(root).parent.parts))
+        for name, path in files(root).items()
+    }
 
 
 @pytest.mark.parametrize(
@@ -87,11 +57,62 @@ def test_the_reader_finds_every_form_of_import(source, name):
     assert imported(source, "epv_env.plant") == {name}
 
 
-@pytest.mark.parametrize("module", ["epv_env", "epv_env.env", "epv_env.vector_env"])
-def test_importing_the_environments_imports_nothing_heavy(module):
-    code = f"import sys, {module}; print([m for m in {HEAVY} if m in sys.modules])"
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, timeout=120,
-        check=True,
-    )  # fmt: skip
-    assert done.stdout.strip() == "[]"
+def nearest(name: str, groups) -> str | None:
+    """The longest of these dotted names that holds a name."""
+    return max((g for g in groups if f"{name}.".startswith(f"{g}.")), key=len, default=None)
+
+
+def test_packages_import_what_the_page_of_the_architecture_says():
+    """So the plant knows no environment, and the diagnosis of any plant knows no valve."""
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    rows = re.findall(r"^\| `([\w.]+)` \|.*\| ([^|]*) \|$", page, re.M)
+    allowed = {name: set(re.findall(r"`([\w.]+)`", may)) for name, may in rows}
+    assert len(allowed) > 6
+    for name, found in imports(ROOT).items():
+        own = nearest(name, allowed)
+        assert own is not None, name
+        others = {nearest(each, allowed) for each in found} - {own, None}
+        assert others <= allowed[own], f"{name} imports {others - allowed[own]}"
+
+
+def test_only_the_adaptor_knows_stable_baselines3_and_torch_and_the_plant_no_environment():
+    for name, found in imports(ROOT).items():
+        tops = {each.partition(".")[0] for each in found}
+        if name.startswith("epv_env.") and name != "epv_env.sb3":
+            assert not tops & {"torch", "stable_baselines3"}, name
+        if name.startswith(("epv_env.plant", "epv_env.common")):
+            assert not tops & {"gymnasium", *HEAVY}, name
+
+
+def folder_graph(root: Path) -> dict[str, set[str]]:
+    """Folders that each folder imports from; a file beside folders of its folder counts as a folder."""
+    known = files(root)
+    parents = {name: ".".join(path.relative_to(root).parent.parts) for name, path in known.items()}
+    with_folders = {parent.rpartition(".")[0] for parent in parents.values()}
+    folder = {name: name if parent in with_folders else parent for name, parent in parents.items()}
+    graph: dict[str, set[str]] = {}
+    for name, found in imports(root).items():
+        targets = {folder[own] for each in found if (own := nearest(each, known)) is not None}
+        graph.setdefault(folder[name], set()).update(targets - {folder[name]})
+    return graph
+
+
+def test_no_folder_imports_itself_by_a_detour():
+    graph = folder_graph(ROOT)
+    assert len(graph) > 15
+    tuple(TopologicalSorter(graph).static_order())
+
+
+def test_a_loop_of_folders_is_found(tmp_path):
+    (tmp_path / "epv_env/plant").mkdir(parents=True)
+    (tmp_path / "epv_env/task.py").write_text("from epv_env.plant.flow import KAPPA\n")
+    (tmp_path / "epv_env/plant/flow.py").write_text("def late():\n    from epv_env import task\n")
+    with pytest.raises(CycleError):
+        tuple(TopologicalSorter(folder_graph(tmp_path)).static_order())
+
+
+def test_importing_the_environments_imports_nothing_heavy():
+    code = "import sys, epv_env.render, epv_env.vector_env; print(*sys.modules)"
+    words = [sys.executable, "-c", code]
+    done = subprocess.run(words, cwd=ROOT, capture_output=True, text=True, timeout=120, check=True)
+    assert not set(HEAVY) & set(done.stdout.split())

@@ -73,21 +73,6 @@ def test_a_direct_fit_reaches_the_known_error(name, effects, known):
     assert held_out_error(plant(name), effects) == pytest.approx(known, rel=0.06)
 
 
-@pytest.mark.parametrize("name", PLANTS)
-def test_every_cause_acts_at_its_trials_and_not_at_its_nominal_value(name):
-    own = plant(name)
-    base = own.outputs({}, [0])[0]
-    assert np.all(np.isfinite(base))
-    for cause in own.causes:
-        (size,) = cause.parameters
-        values = np.array([size.nominal, *size.trials])
-        assert np.all((values >= size.low) & (values <= size.high)), cause.name
-        found = own.outputs({size.symbol: values}, [0])[0]
-        np.testing.assert_array_equal(found[..., :1], base, err_msg=cause.name)
-        noise = own.channels[0].noise
-        assert np.min(np.max(np.abs(found[..., 1:] - base), axis=(0, 1))) > noise, cause.name
-
-
 def test_a_missing_folder_is_told_with_the_source_of_the_data(monkeypatch, tmp_path):
     options = ["--data", str(tmp_path / "none"), "--out", str(tmp_path / "out")]
     monkeypatch.setattr("sys.argv", ["toy_car", *options])

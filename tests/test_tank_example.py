@@ -1,4 +1,4 @@
-"""The tank of docs/examples obeys its closed forms, reads its files, and is diagnosed by one command."""
+"""The tank of docs/examples obeys its closed forms, and is diagnosed by one command."""
 
 import json
 
@@ -7,15 +7,12 @@ import pytest
 
 from docs.examples.tank import (
     AREA,
-    HEADER,
     START,
     Tank,
     levels,
     main,
-    read_runs,
     readings,
     virtual_recordings,
-    write_runs,
 )
 from identification.gap.plant import window_forcing
 
@@ -58,32 +55,6 @@ def test_forcings_of_all_windows_make_that_of_the_whole_run():
     np.testing.assert_allclose(np.sum(parts, axis=2), whole[..., 0], rtol=2e-2, atol=1e-6)
 
 
-def test_recordings_come_back_from_their_files(tmp_path):
-    written = virtual_recordings({"leak": 2e-3}, seed=1)
-    write_runs(written, tmp_path)
-    for one, other in zip(written, read_runs(tmp_path), strict=True):
-        assert (one.name, one.held_out) == (other.name, other.held_out)
-        np.testing.assert_allclose(other.time, one.time, atol=1e-9)
-        np.testing.assert_allclose(other.measured, one.measured, atol=1e-6)
-        np.testing.assert_allclose(other.inputs["q"], one.inputs["q"], rtol=1e-6)
-    assert [run.held_out for run in written] == [False, False, True]
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("", "line 1: the header is not"),
-        (f"{HEADER}\n0,1,one\n", "give every line three numbers"),
-        (f"{HEADER}\n0,1,1\n0.5,1,1\n2,1,1\n", "not uniform from 0"),
-        (f"{HEADER}\n0,1,1\n0.5,nan,1\n1,1,1\n", "not finite"),
-    ],
-)
-def test_a_file_that_cannot_be_used_is_refused_in_a_sentence(text, said, tmp_path):
-    (tmp_path / "test_1.csv").write_text(text, encoding="utf-8")
-    with pytest.raises(ValueError, match=rf"test_1\.csv.*{said}"):
-        read_runs(tmp_path)
-
-
 def test_the_command_finds_the_leak(monkeypatch, capsys, tmp_path):
     monkeypatch.setattr("sys.argv", ["tank", "--out", str(tmp_path)])
     assert main() == 0
@@ -94,8 +65,3 @@ def test_the_command_finds_the_leak(monkeypatch, capsys, tmp_path):
     low, high = found["causes"][0]["magnitude"]["leak_1_per_s"][1:]
     assert low <= 4e-3 <= high
     assert "data:image/svg+xml" in (tmp_path / "report.html").read_text(encoding="utf-8")
-
-
-def test_a_folder_without_recordings_is_refused(tmp_path):
-    with pytest.raises(ValueError, match="has no CSV files: give a folder of recordings"):
-        read_runs(tmp_path)

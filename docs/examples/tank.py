@@ -10,17 +10,13 @@ import argparse
 import sys
 from collections.abc import Mapping, Sequence
 from copy import copy
-from pathlib import Path
 
 import numpy as np
-from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.files import write_text
 from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import diagnose
-from identification.gap.locate.localisation import MissingTerm
 from identification.gap.plant import (
     Cause,
     Channel,
@@ -30,7 +26,6 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.report.figures import missing_term_figure
 from identification.gap.report.gap_json import write_results
 from identification.gap.report.page import sections
 from identification.gap.report.sentences import verdict_sentence
@@ -90,11 +85,6 @@ def readings(values: Mapping[str, NDArray], level: NDArray, period: float) -> ND
     return np.array(read) + p["zero"]
 
 
-HEADER = "time_s,inflow_m3_per_s,level_m"
-
-HELD_OUT = "validation"
-"""Recordings whose names begin with this word are held out: no fit uses them."""
-
 NOISE = 2e-3
 """Standard deviation of a reading [m], from a recording at rest."""
 
@@ -103,7 +93,7 @@ PERIOD, SAMPLES, RUNS = 0.5, 240, 3
 
 
 def virtual_recordings(truth: Mapping[str, float], seed: int = 0) -> list[Run]:
-    """Recordings of a virtual tank under random steps of the inflow.
+    """Recordings of a virtual tank under random steps of the inflow; the last one is held out.
 
     truth: values of the tank by symbol [SI]. seed: of the noise.
     """
@@ -113,56 +103,17 @@ def virtual_recordings(truth: Mapping[str, float], seed: int = 0) -> list[Run]:
     for number in range(1, RUNS + 1):
         inflow = np.repeat(steps.uniform(0.002, 0.02, 6), SAMPLES // 6)
         clean = readings(values, levels(values, inflow, PERIOD), PERIOD)[:, 0]
-        name = f"test_{number}" if number < RUNS else HELD_OUT
-        runs.append(as_run(name, PERIOD, inflow, clean + NOISE * noise.standard_normal(SAMPLES)))
+        level = clean + NOISE * noise.standard_normal(SAMPLES)
+        run = Run(
+            name=f"test_{number}" if number < RUNS else "validation",
+            held_out=number == RUNS,
+            time=PERIOD * np.arange(SAMPLES),
+            measured=level[None],
+            trusted=np.ones((1, SAMPLES), dtype=bool),
+            inputs={"q": inflow},
+        )
+        runs.append(run)
     return runs
-
-
-def as_run(name: str, period: float, inflow: NDArray, level: NDArray) -> Run:
-    """A recording as the diagnosis sees it; every reading counts.
-
-    period: of sampling [s]. inflow: (samples,) [m^3/s]. level: readings, (samples,) [m].
-    """
-    return Run(
-        name=name,
-        held_out=name.startswith(HELD_OUT),
-        time=period * np.arange(len(level)),
-        measured=level[None],
-        trusted=np.ones((1, len(level)), dtype=bool),
-        inputs={"q": inflow},
-    )
-
-
-def write_runs(runs: Sequence[Run], folder: Path) -> None:
-    """Write one CSV file for each recording."""
-    for run in runs:
-        table = np.stack([run.time, run.inputs["q"], run.measured[0]], axis=1).tolist()
-        lines = [HEADER, *(",".join(f"{cell:.7g}" for cell in row) for row in table)]
-        write_text(folder / f"{run.name}.csv", "\n".join(lines) + "\n")
-
-
-def read_runs(folder: Path) -> list[Run]:
-    """All recordings of a folder, by name. Raises ValueError for a file that cannot be used."""
-    paths = sorted(folder.glob("*.csv"))
-    if not paths:
-        raise ValueError(f"{folder} has no CSV files: give a folder of recordings")
-    return [_read(path) for path in paths]
-
-
-def _read(path: Path) -> Run:
-    lines = path.read_text(encoding="utf-8").splitlines()
-    if not lines or lines[0] != HEADER:
-        raise ValueError(f"{path}, line 1: the header is not {HEADER}: name the columns so")
-    try:
-        time, inflow, level = np.loadtxt(lines[1:], delimiter=",", ndmin=2).T
-    except ValueError as error:
-        raise ValueError(f"{path}: {error}: give every line three numbers") from None
-    period = time[-1] / max(len(time) - 1, 1)
-    if period <= 0 or not np.allclose(time, period * np.arange(len(time)), atol=1e-3 * period):
-        raise ValueError(f"{path}: time_s is not uniform from 0: resample the recording")
-    if not np.all(np.isfinite([inflow, level])):
-        raise ValueError(f"{path}: a cell is not finite: cut the recording before it")
-    return as_run(path.stem, float(period), inflow, level)
 
 
 class Tank:
@@ -234,44 +185,19 @@ def _cause(name: str, component: str, unit: str, *, trial: float, high: float) -
 
 
 LEAKING = {"c": 0.021, "leak": 4e-3}
-"""The virtual tank; its recordings are written to --out, and read from there."""
-
-
-def term_and_truth(term: MissingTerm) -> Figure:
-    """The missing term of the virtual tank beside the true one: the leak, and a multiple of √h.
-
-    No recording tells the multiple, since c absorbs it: it is the one that comes nearest.
-    """
-    root, leak = np.sqrt(term.x), 1e3 * LEAKING["leak"] * term.x
-    multiple = root @ (term.y + leak) / (root @ root)
-    figure = missing_term_figure(term)
-    axes = figure.axes[0]
-    label = f"truth: {multiple:.1f} √h - {1e3 * LEAKING['leak']:g} h"
-    axes.plot(term.x, multiple * root - leak, "--", color="tab:red", label=label)
-    axes.legend(fontsize="small")
-    return figure
+"""The virtual tank."""
 
 
 def main() -> int:
     """Diagnose, write gap.json and report.html, print the verdict; returns the exit status."""
     parser = argparse.ArgumentParser(description="Why a model of a tank misses its recordings.")
     parser.add_argument("--out", type=writable_folder, required=True, help="folder of results")
-    parser.add_argument("--recordings", type=Path, default=None, help="folder of your own CSV files")
     parser.add_argument("--seed", type=int, default=0, help="of resampling, and of the virtual noise")
-    parser.add_argument("--images", type=writable_folder, default=None, help="folder of gap-tank.png")
     chosen = parser.parse_args()
-    folder = chosen.recordings
-    if folder is None:
-        folder = chosen.out / "recordings"
-        write_runs(virtual_recordings(LEAKING, chosen.seed), folder)
-    diagnosis = diagnose(Tank(read_runs(folder)), seed=chosen.seed)
+    diagnosis = diagnose(Tank(virtual_recordings(LEAKING, chosen.seed)), seed=chosen.seed)
     write_results(diagnosis, chosen.out)
-    title = f"Gap between model and recordings: {folder}"
+    title = "Gap between model and recordings: a tank"
     write_page(chosen.out / "report.html", title=title, sections=sections(diagnosis))
-    term = diagnosis.localisation.missing_term
-    if chosen.images and term and chosen.recordings is None:
-        chosen.images.mkdir(parents=True, exist_ok=True)
-        term_and_truth(term).savefig(chosen.images / "gap-tank.png", dpi=100)
     print(verdict_sentence(diagnosis)[1])
     return 0
 

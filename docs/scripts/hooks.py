@@ -12,7 +12,7 @@ from mkdocs.structure.files import File, Files
 
 sys.path.insert(0, str(Path(__file__).parents[2]))
 
-from docs.scripts import command_lines, effects_table, notebook
+from docs.scripts import command_lines, effects_table
 
 ROOT = Path(__file__).parents[2]
 """The repository's root."""
@@ -28,7 +28,6 @@ FOLDER_OPTIONS = """    options:
 GENERATED = {
     "<!-- generated: command lines -->": command_lines.page,
     "<!-- generated: effects -->": effects_table.effects_table,
-    "<!-- generated: notebook -->": notebook.page,
 }
 """Lines of pages, and what writes the text that replaces them."""
 API = "API"
@@ -45,8 +44,8 @@ def on_config(config: Any) -> Any:
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the API pages and the pictures of the notebook."""
-    for path, content in {**api_pages(), **notebook.pictures()}.items():
+    """Add the API pages."""
+    for path, content in api_pages().items():
         files.append(File.generated(config, path, content=content))
     return files
 

@@ -93,10 +93,7 @@ def simulate(
     U = np.asarray(U, dtype=float)
     columns = [np.reshape(x, (-1, 1)) if np.ndim(x) < 2 else np.asarray(x) for x in (U, sigma_S)]
     n = max(np.size(value) for value in (*p.values(), *initial, *(c[0] for c in columns)))
-    valves = Valves(n, step=step)
-    valves.set_parameters(np.arange(n), p, reservoir_volume)
-    for field, value in zip(valves.state, initial, strict=True):
-        field[:] = value
+    valves = Valves.started(n, p, initial, reservoir_volume=reservoir_volume, step=step)
     slope = np.zeros((len(U), 1))
     if p1 is not None:
         valves.state.p1[:] = np.asarray(p1)[0]

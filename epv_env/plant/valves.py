@@ -169,6 +169,21 @@ class Valves:
         self.nominal = True
         """Whether no valve has an effect or a delay: `integrate.run_nominal` is then all it takes."""
 
+    @classmethod
+    def started(
+        cls, n: int, p: Mapping[str, ArrayLike], initial: State, *, reservoir_volume: ArrayLike = np.inf,
+        step: float = DEFAULT_STEP, threads: int | None = None,
+    ) -> "Valves":  # fmt: skip
+        """n valves with these parameters (`set_parameters`), whose state is `initial`.
+
+        initial: fields that broadcast to (n,) [SI].
+        """
+        valves = cls(n, step=step, threads=threads)
+        valves.set_parameters(np.arange(n), p, reservoir_volume)
+        for field, value in zip(valves.state, initial, strict=True):
+            field[:] = value
+        return valves
+
     @property
     def memory(self) -> dict[str, NDArray]:
         """The arrays, by name, in which a batch keeps all that its future depends on.

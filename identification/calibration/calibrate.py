@@ -22,8 +22,15 @@ from identification.calibration.search import (
     starting_points,
 )
 from identification.recordings.noise import coarse_step_warnings
-from identification.replay.replay import Response, responses, total_response_error
-from identification.replay.response_blocks import error_table, errors_as_json, percent, worst_picture
+from identification.replay.replay import (
+    Response,
+    error_table,
+    errors_as_json,
+    percent,
+    responses,
+    total_response_error,
+    worst_picture,
+)
 from identification.report.page import Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR
 

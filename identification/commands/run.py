@@ -12,9 +12,8 @@ from epv_env.common.options import Count, Folder, PlantFile, Seed
 from epv_env.plant.plantfile import load_plant
 from identification.calibration.calibrate import STARTS
 from identification.pipeline import run as pipeline
-from identification.pipeline.identification import Identification
+from identification.pipeline.identification import Identification, summary_section
 from identification.pipeline.run import STAGES
-from identification.pipeline.summary import summary_section
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import campaign_facts, rules_of
 from identification.report.page import as_text, write_results

@@ -15,10 +15,10 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core.errors import NumbaError
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from identification.gap.fit.laws import KNOTS, MOST_LAWS
-from identification.gap.runge_kutta import advancing, compiled, copy
 
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit
@@ -115,6 +115,14 @@ class Records:
         return lawful
 
 
+_registered = register_jitable(error_model="numpy", no_cfunc_wrapper=True)
+
+
+def compiled(function: Callable) -> Callable:
+    """The function, which compiled ones may call, too; divisions by zero then give inf, as in numpy."""
+    return function if hasattr(function, "py_func") else _registered(function)
+
+
 @compiled
 def delayed_mean(total: NDArray, since: float, length: float) -> float:
     """Mean of a held input over a stretch.
@@ -127,6 +135,35 @@ def delayed_mean(total: NDArray, since: float, length: float) -> float:
         k = min(max(int(np.floor(ends[i])), 0), len(total) - 2)
         values[i] = total[k] + (ends[i] - k) * (total[k + 1] - total[k])
     return (values[1] - values[0]) / length
+
+
+def stepping(rate: Callable) -> Callable:
+    """A function (x, t, h, u, p, push, work): a classical Runge-Kutta step of x (states,) by h [s].
+
+    push: forcing of the rates, (states,). work: scratch, (5, states): four slopes and a stage.
+
+    rate: derivatives of the states, as `Records.flat` makes it.
+    """
+
+    @compiled
+    def slope(x, t, u, p, push, out):
+        rate(x, t, u, p, out)
+        for i in range(len(x)):
+            out[i] += push[i]
+
+    @compiled
+    def step(x, t, h, u, p, push, work):
+        slope(x, t, u, p, push, work[0])
+        for stage in range(1, 4):
+            part = h if stage == 3 else 0.5 * h
+            for i in range(len(x)):
+                work[4, i] = x[i] + part * work[stage - 1, i]
+            slope(work[4], t + part, u, p, push, work[stage])
+        for i in range(len(x)):
+            inner = work[0, i] + 2.0 * work[1, i] + 2.0 * work[2, i] + work[3, i]
+            x[i] += h / 6.0 * inner
+
+    return step
 
 
 Simulation = Callable[["Job"], tuple[NDArray, NDArray]]
@@ -162,11 +199,11 @@ def _reason(error: NumbaError) -> str:
     return next((line.strip() for line in reversed(lines) if words.search(line)), lines[0])
 
 
-def alone(advance: Callable, read: Callable, channels: int, *, compile_it: bool) -> Simulation:
+def alone(step: Callable, read: Callable, channels: int, *, compile_it: bool) -> Simulation:
     """A simulation in which each candidate has a loop of its own.
 
     Args:
-        advance: of `advancing`.
+        step: of `stepping`.
         read: readings from states, as `Records.flat` makes it.
         channels: number of readings.
         compile_it: whether numba compiles the loop, with all that it calls.
@@ -193,15 +230,16 @@ def alone(advance: Callable, read: Callable, channels: int, *, compile_it: bool)
                     else:
                         u[i] = delayed_mean(total[:, i], begin - delays[i] / period, 1.0 / substeps)
                 if s == 0:
-                    copy(x, states[:, k])
+                    for i in range(len(x)):  # numba compiles a slice with sentences for its errors
+                        states[i, k] = x[i]
                     read(x, k * period, u, p, readings[:, k])
-                advance(x, begin * period, period / substeps, u, p, pushed, work)
+                step(x, begin * period, period / substeps, u, p, pushed, work)
 
     if compile_it:
         loop = numba.njit(error_model="numpy")(loop)
 
     def simulate(job: Job) -> tuple[NDArray, NDArray]:
-        n, work = job.start.shape[1], np.empty((6, len(job.start)))
+        n, work = job.start.shape[1], np.empty((5, len(job.start)))
         states = np.full((n, len(job.start), len(job.inputs)), np.nan)
         readings = np.full((n, channels, len(job.inputs)), np.nan)
         # Integrals of the held inputs [sampling periods], (samples + 1, inputs).
@@ -218,8 +256,8 @@ def alone(advance: Callable, read: Callable, channels: int, *, compile_it: bool)
                 continue  # functions such as math.exp refuse what numpy calls inf
             except NumbaError as error:
                 raise ValueError(
-                    f"rate, readings or thresholds cannot be compiled by numba ({_reason(error)}): let "
-                    "them use numbers, numpy and functions under numba.njit, or choose mode='python'"
+                    f"rate or readings cannot be compiled by numba ({_reason(error)}): let them use "
+                    "numbers, numpy and functions under numba.njit only, or choose mode='python'"
                 ) from error
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
 
@@ -231,7 +269,7 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
 
     Args:
         records: the plant's names.
-        functions: rate, readings and thresholds of records, each with its number of results.
+        functions: rate and readings of records, each with its number of results.
         mode: "compiled" or "python".
 
     Raises:
@@ -240,10 +278,8 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     if mode not in ("compiled", "python"):
         raise ValueError(f"mode '{mode}' is none of compiled, python: choose one of them")
     used = compiled if mode == "compiled" else lambda function: function
-    rate, read, thresholds = (records.flat(used(f), results) for f, results in functions)
-    channels, count = functions[1][1], functions[2][1]
-    advance = advancing(rate, thresholds, count)
-    return alone(advance, read, channels, compile_it=mode == "compiled")
+    rate, read = (records.flat(used(f), results) for f, results in functions)
+    return alone(stepping(rate), read, functions[1][1], compile_it=mode == "compiled")
 
 
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:

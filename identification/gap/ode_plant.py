@@ -46,7 +46,6 @@ class OdePlant:
         units: Mapping[str, tuple[str, float]] | None = None,
         forcing_steps: Mapping[str, float] | None = None,
         regimes: Callable[[Any, Any, Any], Mapping[str, NDArray]] | None = None,
-        thresholds: Callable[[Any, Any, Any], Sequence[Any]] | None = None,
         delays: Mapping[str, str] | None = None,
         steps_per_sample: int | None = None,
         mode: str = "compiled",
@@ -69,8 +68,6 @@ class OdePlant:
             forcing_steps: change of a rate [SI/s] with a small but clear effect, by state; a state
                 that is left out lacks nothing (x' = v).
             regimes: (x, u, p) to boolean (samples,) by name, where x and u hold (samples,) arrays.
-            thresholds: (x, u, p) to numbers, a tuple; where one changes its sign, the rate may jump.
-                The integrator stops there, and it stays where both sides push back (sticking).
             delays: by input the symbol [s] by which it acts late.
             steps_per_sample: Runge-Kutta steps in a sampling period; None: halved until readings at
                 the nominal values and at all trials settle.
@@ -112,9 +109,8 @@ class OdePlant:
             for name in self._records.states
         )
         self._check_names({"components": components, "forcing_steps": forcing_steps})
-        count = self._thresholds(rate, readings, thresholds)
-        none = thresholds or (lambda x, u, p: ())
-        functions = (rate, len(states)), (readings, len(channels)), (none, count)
+        self._check_results(rate, readings)
+        functions = (rate, len(states)), (readings, len(channels))
         self._simulate = simulator(self._records, functions, mode)
         self.steps_per_sample = steps_per_sample or self._settled()
 
@@ -216,8 +212,8 @@ class OdePlant:
                     f"{names.symbols}: correct the names"
                 )
 
-    def _thresholds(self, rate: Callable, readings: Callable, thresholds: Callable | None) -> int:
-        """Number of thresholds. Raises ValueError where a function has another number of results."""
+    def _check_results(self, rate: Callable, readings: Callable) -> None:
+        """Raises ValueError where a function has another number of results."""
         names, run = self._records, self.runs[0]
         p = names.p(*self.nominal.values())
         u = names.u(0.0, *(float(signal[0]) for signal in run.inputs.values()))
@@ -226,7 +222,6 @@ class OdePlant:
             x = names.x(*(float(value) for value in begun))
             _counted("rate", rate(x, u, p), len(names.states), "state")
             _counted("readings", readings(x, u, p), len(self.channels), "channel")
-            return len(thresholds(x, u, p)) if thresholds else 0
         except AttributeError as error:
             raise ValueError(
                 f"OdePlant: a function asks for what is not there ({error}): x has the states "

@@ -11,8 +11,7 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant, save_plant
 from identification.calibration.calibrate import calibration_json, calibration_section
 from identification.confidence.confidence import confidence_json, confidence_section
-from identification.pipeline.identification import ESTIMATOR, Identification
-from identification.pipeline.summary import summary_section
+from identification.pipeline.identification import ESTIMATOR, Identification, summary_section
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
 from identification.quality.section import quality_section

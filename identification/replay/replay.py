@@ -1,7 +1,11 @@
-"""The model on recorded inputs: every recording and every candidate of the parameters in one batch."""
+"""The model on recorded inputs: every recording and every candidate of the parameters in one batch.
+
+In reports: tables of the errors, and the responses over time.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -12,9 +16,13 @@ from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
-from identification.recordings.recording import OUTPUTS, Recording
+from identification.recordings.recording import OUTPUTS, UNITS, Recording
 from identification.replay.model_inputs import ModelInputs, model_inputs
+from identification.report.page import Picture, Table, over_time
 from identification.report_2003 import partial_error, relative_error, total_error
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 LARGEST_BATCH = 1_500_000
 """Samples times valves that are simulated at once: about 40 MB of outputs."""
@@ -137,8 +145,6 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
     tiled: parameters and shifts by lane.
     """
     p2_shift, flow_shift, flow_ramp = (np.asarray(tiled.pop(shift)) for shift in SHIFTS)
-    valves = Valves(n * len(drives))
-    valves.set_parameters(np.arange(valves.n), tiled)
     p1, U, p2 = (
         np.repeat([getattr(drive, name) for drive in drives], n, axis=0)
         for name in ("p1_start", "U_start", "p2_start")
@@ -147,8 +153,7 @@ def _simulate(drives: list[ModelInputs], tiled: dict[str, ArrayLike], n: int) ->
     supply = 1.0 / (1.0 + np.asarray(tiled["g_p1"]))
     p2 = (p2 - tiled["b_p2"]) / (1.0 + np.asarray(tiled["g_p2"]))
     initial = energised(tiled, p1=p1 * supply, p2=p2 + p2_shift, U=U)
-    for field, value in zip(valves.state, initial, strict=True):
-        field[:] = value
+    valves = Valves.started(n * len(drives), tiled, initial)
     inputs, duration = _inputs(drives)
     steps = len(duration)
     outputs = np.empty((len(OUTPUTS), 1 + steps, valves.n))
@@ -194,3 +199,51 @@ def _inputs(drives: list[ModelInputs]) -> tuple[dict[str, NDArray], NDArray]:
         "refill": 0.0 * U,
         "course": course,
     }, period
+
+
+def error_table(responses: Sequence[Response], caption: str) -> Table:
+    """Eqs 19 and 20 by recording, and eq. 21 over all."""
+    rows = [
+        [response.recording.name, *map(percent, response.errors.values()), percent(response.partial)]
+        for response in responses
+    ]
+    if len(responses) > 1:
+        rows.append(["all (eps_total)", "", "", "", percent(total_response_error(responses))])
+    return Table(
+        columns=["Case", *(f"eps_{output} [%]" for output in OUTPUTS), "eps_partial [%]"],
+        rows=rows,
+        caption=f"{caption} Mean distance of model and recording, in percent of the recording's mean.",
+    )
+
+
+def errors_as_json(responses: Sequence[Response]) -> Mapping[str, Any]:
+    """The same in percent, with the field names of the report's tables."""
+    errors: dict[str, Any] = {
+        response.recording.name: {
+            **{f"eps_{output}": 100 * error for output, error in response.errors.items()},
+            "eps_partial": 100 * response.partial,
+        }
+        for response in responses
+    }
+    return {**errors, "eps_total": 100 * total_response_error(responses)}
+
+
+def percent(fraction: float) -> str:
+    """A fraction as the report prints errors, in percent."""
+    return f"{100 * fraction:.4f}"
+
+
+def response_figure(response: Response) -> "Figure":
+    """Voltage, and the measured outputs with the model's over them (Figures 10 to 14)."""
+    rows = {"U [V]": {"voltage": response.recording.U}}
+    for output, measured, model in zip(OUTPUTS, response.measured, response.model, strict=True):
+        unit, size = UNITS[output]
+        rows[f"{output} [{unit}]"] = {"measured": measured / size, "model": model / size}
+    return over_time(response.recording.time, rows, [0.6, 1.0, 1.0, 1.0])
+
+
+def worst_picture(responses: Sequence[Response]) -> Picture:
+    """The response with the greatest partial error (eq. 20)."""
+    worst = max(responses, key=lambda response: response.partial)
+    caption = f"The recording with the greatest error: {worst.recording.name}."
+    return Picture(figure=response_figure(worst), caption=caption)

@@ -109,11 +109,8 @@ def _simulated(
     drive: ModelInputs, p: Mapping[str, float], m: int, inputs: Mapping[str, NDArray]
 ) -> NDArray:
     """OUTPUTS from the second sample on, (3, samples - 1, m)."""
-    valves = Valves(m)
-    valves.set_parameters(np.arange(m), p)
     initial = energised(p, p1=drive.p1_start, p2=drive.p2_start, U=drive.U_start)
-    for field, value in zip(valves.state, initial, strict=True):
-        field[:] = value
+    valves = Valves.started(m, p, initial)
     read = readings(valves.record(Inputs(**inputs), drive.period), p)
     return np.stack([read[output] for output in OUTPUTS])
 

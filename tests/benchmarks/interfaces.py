@@ -51,10 +51,7 @@ def actions(n: int, share: float) -> NDArray:
 def _kernel(n: int, share: float) -> Run:
     """Many periods in one call of the kernel."""
     p = Parameters.calibrated()
-    valves = Valves(n, threads=1)
-    valves.set_parameters(np.arange(n), p)
-    for field, value in zip(valves.state, energised(p, p1=P1, p2=P2, U=U_ON), strict=True):
-        field[:] = value
+    valves = Valves.started(n, p, energised(p, p1=P1, p2=P2, U=U_ON), threads=1)
     on = actions(n, share)
     zeros = np.zeros(on.shape)
     flow = np.random.default_rng(1).uniform(0, 4e-3, (1, n)) + zeros

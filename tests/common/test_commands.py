@@ -85,13 +85,6 @@ def test_wrong_input_is_one_sentence(package, tmp_path, capsys):
     assert "no command 'say-hallo': did you mean 'say-hello'?" in capsys.readouterr().err
 
 
-def test_a_second_process_is_refused(package, tmp_path, capsys):
-    with only_writer(tmp_path / "busy"):
-        arguments = ["say-hello", "--out", str(tmp_path / "busy")]
-        assert main([package], program="epv", arguments=arguments) == 2
-    assert "another process writes into" in capsys.readouterr().err
-
-
 def test_what_a_killed_writer_left_goes_with_the_next_one(tmp_path):
     """A kill between writing and renaming leaves the new content under a hidden name."""
     for name in (

@@ -7,6 +7,8 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -100,23 +102,28 @@ def test_saved_and_loaded_is_the_same(tmp_path: Path) -> None:
         np.testing.assert_array_equal(getattr(loaded, name), value)
 
 
-def test_an_opening_is_read_as_it_was() -> None:
-    """Hand-made readings: the coil off for 20 periods, p3 falls by a factor a period, p2 rises late."""
-    off, on, last = 20, 20, 10
-    coil = np.repeat([1.0, 0.0, 1.0], [on, off, last])
+ON, OFF, LAST = 20, 20, 10
+"""Periods of an opening made by hand."""
+
+
+def opening() -> np.ndarray:
+    """Readings (periods, 6): while the coil is off p3 falls by a factor a period; p2 rises late."""
+    coil = np.repeat([1.0, 0.0, 1.0], [ON, OFF, LAST])
     p3 = np.repeat(11.0, len(coil))
-    p3[on + 1 : on + off + 1] = 11.0 * 0.9 ** np.arange(1, off + 1)
-    p2 = 8.0 + 0.1 * np.maximum(np.arange(len(coil)) - on - 10.0, 0.0)
-    reader, found = OpeningReader(), []
-    for row in zip(coil, *np.broadcast_arrays(24.0, 11.0, p2, p3, 0.48), strict=True):
-        found += [opening for opening in [reader.update(row)] if opening is not None]
-    ((conditions, z),) = found
+    p3[ON + 1 : ON + OFF + 1] = 11.0 * 0.9 ** np.arange(1, OFF + 1)
+    p2 = 8.0 + 0.1 * np.maximum(np.arange(len(coil)) - ON - 10.0, 0.0)
+    return np.column_stack(np.broadcast_arrays(coil, 24.0, 11.0, p2, p3, 0.48))
+
+
+def test_an_opening_is_read_as_it_was() -> None:
+    reader = OpeningReader()
+    ((conditions, z),) = [found for row in opening() if (found := reader.update(row)) is not None]
     values: dict[str, float] = dict(zip((*FEATURES, *CONDITIONS), [*z, *conditions], strict=True))
     opens = 10.0 + RISE / 0.1  # periods after the command
     expected = {
         "I_on": 0.02, "p3_rest": 0.0, "p3_off_1": np.log(0.9), "p3_vents_late": 4 * np.log(0.9),
-        "time_opens": opens, "open": off - opens, "p1": 11.0, "p2": 8.0, "U": 24.0, "slope": 0.0,
-        "p2_rise": 0.1 * (off - 10),
+        "time_opens": opens, "open": OFF - opens, "p1": 11.0, "p2": 8.0, "U": 24.0, "slope": 0.0,
+        "p2_rise": 0.1 * (OFF - 10),
     }  # fmt: skip
     assert {name: values[name] for name in expected} == pytest.approx(expected)
 
@@ -138,17 +145,6 @@ def test_the_log_of_a_drive_has_openings(tmp_path) -> None:
     monitor = Monitor(white_model())
     follow(monitor, read_log(tmp_path / "log"))
     assert len(monitor.history) >= 3
-
-
-@pytest.mark.parametrize(("channel", "value"), [(4, np.nan), (2, np.inf), (1, 0.0)])
-def test_an_opening_with_a_missing_reading_does_not_count(channel, value) -> None:
-    plant = Plant.calibrated()
-    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
-    drive = drives(plant, controller, [3], {}, duration=10.0)[0]
-    drive[30::60, channel] = value
-    reader = OpeningReader()
-    found = [opening for opening in map(reader.update, drive.tolist()) if opening is not None]
-    assert all(np.all(np.isfinite(z)) for _, z in found)
 
 
 @pytest.mark.skipif(shutil.which("cc") is None, reason="needs a C compiler")
@@ -184,14 +180,9 @@ def test_c_code_says_what_python_says(tmp_path: Path) -> None:
 @pytest.mark.parametrize("value", [1.7e308, -1e300, 1e154, 5e-324, 0.0, np.inf, np.nan])
 def test_a_reading_of_any_size_leaves_the_monitor_able_to_find_a_change(column, value) -> None:
     """After openings with the reading in each place, a shift of every feature is found."""
-    off, on, last = 20, 20, 10
     monitor = Monitor(white_model())
-    for place in range(off + on + last):
-        coil = np.repeat([1.0, 0.0, 1.0], [on, off, last])
-        p3 = np.repeat(11.0, len(coil))
-        p3[on + 1 : on + off + 1] = 11.0 * 0.9 ** np.arange(1, off + 1)
-        p2 = 8.0 + 0.1 * np.maximum(np.arange(len(coil)) - on - 10.0, 0.0)
-        rows = np.column_stack(np.broadcast_arrays(coil, 24.0, 11.0, p2, p3, 0.48))
+    for place in range(ON + OFF + LAST):
+        rows = opening()
         rows[place, column] = value
         monitor.follow(rows)
     assert len(monitor.history) > 0
@@ -215,18 +206,34 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
 
 
 def test_a_diagnosis_that_differs_is_explained() -> None:
-    content = {"verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None}
+    content: dict[str, Any] = {
+        "verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None,
+        "causes": [], "levels": {"form": {}},
+    }  # fmt: skip
+    log: Any = SimpleNamespace(drives=[SimpleNamespace(file=f"drive-{k}.csv") for k in (1, 2)])
     monitor = Monitor(white_model())
-    assert "agrees: no_gap" in agreement(monitor, content)
+
+    def said() -> str:
+        return agreement(monitor, log, [50.0, 100.0], content)
+
+    assert said() == "The diagnosis agrees: no_gap."
     monitor._log[1] = 50.0
-    assert "second (no_gap): the valve differs from the start on" in agreement(monitor, content)
+    assert "does not name second, by which the valve differs from the start on" in said()
     monitor._since[1] = 60.0
-    assert "second (no_gap): this effect is absorbed" in agreement(monitor, content)
-    content["ambiguity_set"] = [["second"], ["third"]]
-    assert "agrees" in agreement(monitor, content)
+    assert "does not name second, which recalibration" in said()
+    content |= {"ambiguity_set": [["second"]], "verdict": "known"}
+    assert "has second begin in drive-1.csv, not drive-2.csv" in said()
+    content["causes"] = [{"effects": ["second"], "onset": {"second (x)": {"drive": "drive-2.csv"}}}]
+    assert said() == "The diagnosis agrees: known."
+    content["ambiguity_set"] = [["first"]]
+    assert "names first, which acts in all drives" in said()
+    content |= {"absorbed": [], "onset": {"drive": "drive-2.csv"}}
+    assert "names first, where the monitor names what looks alike" in said()
+    assert "does not name second, which looks like what it names" in said()
     content["ambiguity_set"] = [["third"]]
-    assert "names third: it simulates every effect" in agreement(monitor, content)
-    assert "hardly shows" in agreement(Monitor(white_model()), content)
+    assert "names third, which hardly shows" in said()
+    content["ambiguity_set"] = []
+    assert "does not name second, since it allows for a misfit" in said()
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:

@@ -101,8 +101,3 @@ def test_knowing_the_valve_is_worth_something():
 def test_a_trigger_above_the_aim_is_refused():
     with pytest.raises(ValueError, match="trigger < aim"):
         AdaptivePulse(plant=PLANT, pulse=USUAL._replace(trigger=0.1))
-
-
-def test_an_informed_controller_that_sees_no_task_says_so():
-    with pytest.raises(ValueError, match="call watch"):
-        InformedPulse().act(observe(0.0))

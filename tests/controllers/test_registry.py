@@ -17,14 +17,7 @@ from controllers.policy import Policy, load_policy
 from controllers.pulse import _Pulse
 from controllers.registration import Choice, RegistrationError
 from controllers.registry import REGISTRY, TUNED_KINDS, registration
-from controllers.tuned import (
-    ControllersFileError,
-    Tuning,
-    build,
-    load_tunings,
-    save_tunings,
-    tuned,
-)
+from controllers.tuned import ControllersFileError, Tuning, build, load_tunings, save_tunings, tuned
 from epv_env.plant.plantfile import Plant
 
 UNREGISTERED = {

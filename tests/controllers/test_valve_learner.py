@@ -12,12 +12,10 @@ from controllers.valve_learner import (
     GAIN_SPREAD,
     MOST_RESERVE,
     OFFSET_SPREAD,
-    OFFSETS,
     TOLERATED,
     VALVE,
 )
 from epv_env.common.units import BAR
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
@@ -85,14 +83,6 @@ def test_a_rise_before_the_expected_opening_tells_of_a_higher_opening_pressure(t
     assert second["offset"] == pytest.approx(0.0, abs=1e-12)
 
 
-def test_probabilities_stay_a_distribution_and_spread_to_the_neighbours():
-    (record,) = unknown()
-    record["probability"] = np.eye(len(OFFSETS))[10]
-    valve_learner.smear(record)
-    assert record["probability"].sum() == pytest.approx(1.0)
-    assert np.flatnonzero(record["probability"]).tolist() == [9, 10, 11]
-
-
 def controlled(parameters, *, episodes=16, periods=600, **options):
     """The learner of an adaptive pulse controller after episodes on these plants, and their task."""
     pulse = AdaptivePulse(plant=PLANT)
@@ -125,13 +115,8 @@ def test_a_batch_is_learnt_as_its_valves_alone_to_the_bit():
 def test_the_reserve_is_what_the_hardest_application_draws_beyond_what_is_tolerated(table):
     """From rest, with the hardest application as the coil is switched off, until the piston lifts."""
     p1, p2, step = 11.0 * BAR, 8.0 * BAR, 0.1e-3
-    valves = Valves(1, threads=1)
-    valves.set_parameters(np.array([0]), Parameters.calibrated())
-    for field, value in zip(
-        valves.state, energised(Parameters.calibrated(), p1=p1, p2=p2, U=24.0), strict=True
-    ):
-        field[:] = value
-    valves.inputs.U[:] = 0.0
+    nominal = PLANT.parameters
+    valves = Valves.started(1, nominal, energised(nominal, p1=p1, p2=p2, U=24.0), threads=1)
     valves.inputs.sigma_S[:] = HARDEST_FLOW
     while valves.state.xPV[0] == 0:
         valves.advance(step)

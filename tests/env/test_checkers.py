@@ -8,10 +8,7 @@ from gymnasium.wrappers.vector import NormalizeObservation, RecordEpisodeStatist
 
 from tests.env.rollouts import IDS, actions, native
 
-pytestmark = [
-    pytest.mark.parametrize("identifier", IDS),
-    pytest.mark.filterwarnings("error"),
-]
+pytestmark = [pytest.mark.parametrize("identifier", IDS), pytest.mark.filterwarnings("error")]
 
 
 def test_gymnasium_checker(identifier):

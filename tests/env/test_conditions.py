@@ -2,7 +2,6 @@
 
 from typing import Any
 
-import gymnasium
 import numpy as np
 import pytest
 
@@ -39,17 +38,6 @@ def test_single_and_batch_agree_under_all_conditions(identifier):
     commands = actions(identifier, 5, 90)
     found = run(native(identifier, 5, **options), commands)
     assert_same(found, run(side_by_side(identifier, 5, **options), commands))
-
-
-def test_conditions_are_an_option_of_reset_that_lasts_one_episode():
-    env = gymnasium.make("EPValve-v0")
-    vented = {"vented": 1.0}
-    first, _ = env.reset(seed=3, options={"conditions": vented})
-    expected, _ = gymnasium.make("EPValve-v0", conditions=vented).reset(seed=3)
-    np.testing.assert_array_equal(first, expected)
-    again, _ = env.reset(seed=3)
-    np.testing.assert_array_equal(again, gymnasium.make("EPValve-v0").reset(seed=3)[0])
-    assert not np.array_equal(first, again)
 
 
 def test_a_probability_is_the_share_of_the_episodes():

@@ -67,12 +67,9 @@ def test_the_time_limit_truncates(identifier, limit):
     assert steps[-1][-1]["is_success"].all()
 
 
-def test_who_stays_in_the_band_succeeds_once_settled():
+def test_who_stays_in_the_band_succeeds_once_settled_and_who_leaves_it_then_fails():
     success = [info["is_success"] for info in drive(lambda k, error: 1)]
     assert success == [False] * SETTLED + [True] * 20
-
-
-def test_who_leaves_the_band_after_settling_fails():
     infos = list(drive(lambda k, error: int(k < SETTLED + 5), p2_bar=8.3, periods=160))
     assert infos[SETTLED]["is_success"]
     assert infos[-1]["deviation_bar"] > 0.5

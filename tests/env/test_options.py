@@ -35,6 +35,8 @@ CHOICES = [
     {"target_bar": (6.0, 6.5)},
     {"p2_bar": (5.0, 6.0)},
     {"p3_bar": 3.0},
+    {"conditions": {"vented": 1.0}},
+    {"conditions": {"starved": 1.0}},
 ]
 
 

@@ -28,15 +28,11 @@ def run_abroad(code: str, folder) -> str:
 
 
 @pytest.mark.parametrize("identifier", IDS)
-def test_an_id_makes_its_classes(identifier):
+def test_an_id_makes_its_classes_for_episodes_of_ten_seconds(identifier):
     single, vector = CLASSES[identifier]
-    assert type(gymnasium.make(identifier).unwrapped) is single
-    assert type(gymnasium.make_vec(identifier, num_envs=2)) is vector
-
-
-@pytest.mark.parametrize("identifier", IDS)
-def test_an_episode_lasts_ten_seconds(identifier):
     env: Any = gymnasium.make(identifier)
+    assert type(env.unwrapped) is single
+    assert type(gymnasium.make_vec(identifier, num_envs=2)) is vector
     assert env.spec.max_episode_steps * env.unwrapped.settings.control_period == 10.0
     assert native(identifier, 1).max_episode_steps == env.spec.max_episode_steps
 

@@ -2,15 +2,12 @@
 
 import copy
 import pickle
-import subprocess
 import sys
 from dataclasses import replace
-from pathlib import Path
 
 import gymnasium
 import numpy as np
 import pytest
-from gymnasium.wrappers import RecordVideo
 from numpy.typing import NDArray
 
 from epv_env.render import Renderer, Snapshot, canvas, geometry, strip, window
@@ -58,17 +55,6 @@ def test_a_frame_is_an_rgb_image() -> None:
     assert image.std() > 20.0
 
 
-def test_nothing_of_the_last_frame_is_left() -> None:
-    """A frame depends on its snapshot only, once the history is forgotten."""
-    pytest.importorskip("pygame")
-    renderer = Renderer("rgb_array", fps=60)
-    renderer.draw(replace(OPEN, p2_bar=12.34, sigma_S_g_per_s=33.33, time_s=12345.678))
-    renderer.reset()
-    image = renderer.draw(SHUT)
-    assert image is not None
-    assert np.array_equal(image, frame(SHUT))
-
-
 def test_the_piston_lifts_by_its_stroke() -> None:
     lift = geometry.movers(SHUT).piston_bottom - geometry.movers(OPEN).piston_bottom
     assert lift == geometry.STROKE_PV
@@ -107,17 +93,6 @@ def test_reset_clears_the_strip_chart() -> None:
     assert counts[2] > counts[1] > 0
 
 
-def test_phases_are_told_apart() -> None:
-    names = {
-        window.phase(replace(SHUT, coil_on=coil_on, xPV_fraction=xPV, xMV_fraction=xMV))[0]
-        for coil_on, xPV, xMV in (
-            (True, 0.0, 1.0), (True, 0.5, 1.0), (True, 0.5, 0.0),
-            (False, 0.0, 0.0), (False, 0.5, 0.0), (False, 0.0, 1.0),
-        )
-    }  # fmt: skip
-    assert names == {"Holding", "Closing", "Pulling in", "Venting", "Filling", "Releasing"}
-
-
 def test_human_mode_shows_a_window() -> None:
     pygame = pytest.importorskip("pygame")
     renderer = Renderer("human", fps=1000)
@@ -140,32 +115,11 @@ def test_drawing_goes_on_without_a_window_that_the_user_shut() -> None:
     renderer.close()
 
 
-def test_an_episode_is_filmed(tmp_path: Path) -> None:
-    pytest.importorskip("moviepy", reason="needs the extra 'video'")
-    env = gymnasium.make("EPValve-v0", render_mode="rgb_array", max_episode_steps=10)
-    film = RecordVideo(env, str(tmp_path), episode_trigger=lambda _: True)
-    film.reset(seed=0)
-    for _ in range(10):
-        film.step(1)
-    film.close()
-    assert [path.stat().st_size > 1000 for path in tmp_path.glob("*.mp4")] == [True]
-
-
 def test_without_pygame_the_remedy_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "pygame", None)
     renderer = Renderer("rgb_array", fps=60)
     with pytest.raises(gymnasium.error.DependencyNotInstalled, match=r"pip install -e '\.\[render\]'"):
         renderer.draw(SHUT)
-
-
-def test_importing_the_renderer_imports_no_graphics() -> None:
-    code = (
-        "import sys, epv_env.render\n"
-        "loaded = {'pygame', 'matplotlib'} & set(sys.modules)\n"
-        "assert not loaded, loaded\n"
-    )
-    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
-    assert result.returncode == 0, result.stderr
 
 
 def test_the_first_picture_shows_what_has_been() -> None:

@@ -47,32 +47,18 @@ def test_what_follows_is_the_same_to_the_bit(kind, count, mode):
     env.reset(seed=4)
     actions = rng.integers(0, 2, size=(330, count) if count else 330)
     driven(env, actions[:270])  # beyond a block of noise, and an episode ends soon
-    saved = copy.deepcopy(save_state(env))
-    copied = copy.deepcopy(env)
+    saved, copies = copy.deepcopy(save_state(env)), [copy.deepcopy(env)]
+    if kind != "with signals":  # only numbers go into a file
+        saved = SavedState.from_bytes(saved.to_bytes())
+        copies.append(pickle.loads(pickle.dumps(env)))
     expected = driven(env, actions[270:])
     assert driven(env, actions[270:]) != expected  # the comparison can fail
-    assert driven(copied, actions[270:]) == expected
-    restore_state(env, saved)
-    assert driven(env, actions[270:]) == expected
     another = make(kind, count, mode)
     another.reset(seed=9)
-    restore_state(another, saved)
-    assert driven(another, actions[270:]) == expected
-
-
-@pytest.mark.parametrize("count", [None, 3])
-@pytest.mark.parametrize("options", [{}, {"supply": 12.0}], ids=str)
-def test_a_state_survives_a_file(count, options):
-    env, other = make("nominal", count), make("nominal", count)
-    env.reset(seed=1, options=options)
-    other.reset(seed=2)
-    actions = np.random.default_rng(1).integers(0, 2, size=(50, count) if count else 50)
-    content = save_state(env).to_bytes()
-    pickled = pickle.dumps(env)
-    expected = driven(env, actions)
-    restore_state(other, SavedState.from_bytes(content))
-    assert driven(other, actions) == expected
-    assert driven(pickle.loads(pickled), actions) == expected
+    for each in (env, another):
+        restore_state(each, saved)
+    for each in (env, another, *copies):
+        assert driven(each, actions[270:]) == expected
 
 
 def test_supplies_of_their_own_survive_a_file():
@@ -109,11 +95,9 @@ def test_what_cannot_be_restored_is_refused():
         with pytest.raises(StateError, match=words):
             restore_state(each, saved)
     content = saved.to_bytes()
-    wrong_files = (b"", b"no archive", content[:100], b"\xff" * 60 + content[60:], pickle.dumps(saved))
-    for damaged in (
-        *wrong_files,
-        msgspec.msgpack.encode({**msgspec.structs.asdict(saved), "version": 2}),
-    ):
+    later = msgspec.msgpack.encode({**msgspec.structs.asdict(saved), "version": 2})
+    changed_head = b"\xff" * 60 + content[60:]
+    for damaged in (b"", b"no archive", content[:100], changed_head, pickle.dumps(saved), later):
         with pytest.raises(StateError, match="no saved state"):
             SavedState.from_bytes(damaged)
 

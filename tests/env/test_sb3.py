@@ -72,22 +72,15 @@ def test_a_truncated_episode_tells_its_end():
     assert env.step(on)[3] == [{}, {}]
 
 
-def test_seeds_are_forwarded():
+def test_seeds_and_options_are_forwarded():
     env = batch("EPValve-v0", 3)
     assert list(env.seed(7)) == [7, 8, 9]
     expected, _ = native("EPValve-v0", 3).reset(seed=7)
     np.testing.assert_array_equal(env.reset(), expected)
     assert np.any(env.reset() != expected)  # a seed is used once
-    env.seed(7)
-    np.testing.assert_array_equal(env.reset(), expected)
-
-
-def test_options_of_their_own_are_forwarded():
-    env = batch("EPValve-v0", 2)
-    env.set_options([{"target_bar": 7.0}, {"target_bar": (8.0, 8.1)}])
+    env.set_options([{"target_bar": 7.0}, {"target_bar": (8.0, 8.1)}, {}])
     env.reset()
-    assert env.env.task.target[0] == 7.0
-    assert 8.0 <= env.env.task.target[1] <= 8.1
+    assert 7.0 == env.env.task.target[0] < 8.0 <= env.env.task.target[1] <= 8.1
 
 
 def test_attributes_and_methods_are_reached():

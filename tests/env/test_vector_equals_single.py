@@ -26,29 +26,25 @@ EVERYTHING = {"parameters": "sensitive_ten_percent", "target_bar": (6.0, 9.0)}
 pytestmark = pytest.mark.parametrize("identifier", IDS)
 
 
-@pytest.mark.parametrize("n", [1, 3, 17])
-def test_trajectories_are_those_of_sync_vector_env(identifier, n):
-    commands = actions(identifier, n, PERIODS)
-    found = run(native(identifier, n, **EVERYTHING), commands, seed=n)
-    assert_same(found, run(side_by_side(identifier, n, **EVERYTHING), commands, seed=n))
-
-
-def test_plants_of_a_mixture_are_drawn_alike(identifier):
-    options = {"parameters": MIXTURE, "privileged": True}
-    commands = actions(identifier, 5, PERIODS)
-    found = run(native(identifier, 5, **options), commands)
-    assert_same(found, run(side_by_side(identifier, 5, **options), commands))
-
-
-def test_signals_and_effects_are_followed_alike(identifier):
-    options = {
+ALIKE = {
+    "mixture": {"parameters": MIXTURE, "privileged": True},
+    "signals and effects": {
         "target_bar": lambda t: 8.0 + np.sin(t), "supply": 12.0, "p2_bar": 7.0, "privileged": True,
         "scenario": RecordedConsumption.from_samples([0.0, 0.2], [0.0, 4.0]),
         "effects": {"eddy_current": (0.0, 0.004)},
-    }  # fmt: skip
-    commands = actions(identifier, 3, PERIODS)
-    found = run(native(identifier, 3, **options), commands)
-    assert_same(found, run(side_by_side(identifier, 3, **options), commands))
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("n", "options"),
+    [(1, EVERYTHING), (3, EVERYTHING), (17, EVERYTHING), *[(5, options) for options in ALIKE.values()]],
+    ids=["1", "3", "17", *ALIKE],
+)
+def test_trajectories_are_those_of_sync_vector_env(identifier, n, options):
+    commands = actions(identifier, n, PERIODS)
+    found = run(native(identifier, n, **options), commands, seed=n)
+    assert_same(found, run(side_by_side(identifier, n, **options), commands, seed=n))
 
 
 @pytest.mark.parametrize("seed", [5, [7, 1, 7], [7, 2**40, 0]])
@@ -77,16 +73,10 @@ def test_a_long_episode_crosses_every_block_of_noise_alike(identifier):
     assert_same(found, run(side_by_side(identifier, 1, max_episode_steps=1000), commands))
 
 
-def test_a_trajectory_does_not_depend_on_its_companions(identifier):
+def test_a_trajectory_does_not_depend_on_companions_or_threads(identifier):
     few = run(native(identifier, 3, **EVERYTHING), actions(identifier, 3, PERIODS))
-    many = run(native(identifier, 40, **EVERYTHING), actions(identifier, 40, PERIODS))
+    many = run(native(identifier, 150, threads=2, **EVERYTHING), actions(identifier, 150, PERIODS))
     assert_same(part(many, slice(0, 3)), few)
-
-
-def test_a_trajectory_does_not_depend_on_threads(identifier):
-    n = 150
-    one = run(native(identifier, n, threads=1), actions(identifier, n, 20))
-    assert_same(run(native(identifier, n, threads=2), actions(identifier, n, 20)), one)
 
 
 def test_the_comparison_can_fail(identifier):

@@ -20,7 +20,6 @@ from epv_env.plant.plantfile import load_plant
 from identification.__main__ import main
 from identification.calibration import search as starts
 from identification.recordings.campaign_files import read_campaign
-from tests.identification.browser import DESK, PHONE, box, check_layout, opened
 
 
 @pytest.fixture(scope="module")
@@ -37,10 +36,10 @@ def campaign(tmp_path_factory):
 def finished(campaign, tmp_path_factory):
     """A folder in which `run` has worked on it."""
     out = tmp_path_factory.mktemp("run")
-    said = StringIO()
-    with redirect_stdout(said):
+    with redirect_stdout(StringIO()) as said:
         assert main(["run", str(campaign), "--out", str(out), "--starts", "2"]) == 0
-    (out / "said.txt").write_text(said.getvalue())
+    (resistance,) = [line for line in said.getvalue().splitlines() if "(R) | " in line]
+    assert re.search(r" \| 4[\d.]+ \(4[\d.]+ to 4[\d.]+\) ohm \| yes$", resistance, re.IGNORECASE)
     return out
 
 
@@ -75,6 +74,8 @@ def test_the_report_needs_no_other_file(finished):
     sources = re.findall(r'(?:src|href)="([^"]{0,20})', page)
     assert len(sources) > 3
     assert all(source.startswith(("data:image/svg+xml", "#")) for source in sources)
+    places = set(re.findall(r'href="#([^"]+)"', page))
+    assert places <= set(re.findall(r'id="([^"]+)"', page))
     assert len(page) < 5e6
 
 
@@ -88,26 +89,12 @@ def test_the_report_begins_with_the_values_their_meaning_and_whether_to_trust_th
     assert "test1, test2, test3, test4 (calibration); validation (validation); rest (quality)" in first
 
 
-def test_the_terminal_shows_values_with_unit_interval_and_trust(finished, campaign):
-    lines = (finished / "said.txt").read_text().splitlines()
-    (resistance,) = [line for line in lines if "(R) | " in line]
-    assert re.search(r" \| 4[\d.]+ \(4[\d.]+ to 4[\d.]+\) ohm \| yes$", resistance, re.IGNORECASE)
-    assert lines[-1].split()[1:3] == ["gap", str(campaign)]
-
-
 def test_the_report_of_a_bench_says_nothing_of_2003(finished):
     printed = r"SCL-001|2003|[Tt]he report|Tables? \d|Figures? \d|[Ee]qs?\. ?\d|section \d"
     page = re.sub(
         r'<style>.*?</style>|src="[^"]*"', "", (finished / "report.html").read_text(), flags=re.S
     )
     assert re.findall(printed, page) == []
-
-
-def test_the_report_in_a_browser(finished, tmp_path):
-    check_layout(finished / "report.html", tmp_path)
-    for window in (DESK, PHONE):
-        with opened(finished / "report.html", window) as page:
-            assert box(page, ".judging")["bottom"] < window[1]  # all values on the first screen
 
 
 def test_the_environment_draws_its_plants_from_the_joint_region(finished):
@@ -161,45 +148,6 @@ def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path
     assert "No record at rest shows the sensors" in page
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        (["bench", "--set", "R=abc"], "give SYMBOL=VALUE with a number"),
-        (["bench", "--set", "R"], "give SYMBOL=VALUE with a number"),
-        (["bench", "--set", "Q=3"], "unknown parameter 'Q'"),
-        (["bench", "--set", "R=1"], "outside its domain"),
-        (["bench", "--effect", "gremlins=1"], "unknown effect; known are"),
-        (["bench", "--effect", "local_gas_speed=0.1"], "sized by a1, a2"),
-        (["bench", "--effect", "circuit_leak=x"], "--effect circuit_leak=x: give NAME=SIZE with a"),
-        (["bench", "--effect", "circuit_leak=1"], "outside its domain"),
-        (["bench", "--rate", "100"], "sampling rate 100"),
-        (["bench", "--plant", "/no/plant.json"], "cannot read plant file"),
-        (["run", "/no/campaign"], "cannot read"),
-    ],
-)
-def test_a_wrong_value_is_refused_in_one_sentence(arguments, message, tmp_path, capsys):
-    assert main([*arguments, "--out", str(tmp_path / "out")]) == 2
-    assert message in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    "arguments",
-    [
-        ["run", "campaign", "--starts", "0"],
-        ["run", "campaign", "--stage", "none"],
-        ["bench", "--seed", "-1"],
-        ["bench", "--suite", "none"],
-    ],
-)
-def test_a_wrong_option_is_refused_with_the_usage(arguments, tmp_path, capsys):
-    with pytest.raises(SystemExit) as refusal:
-        main([*arguments, "--out", str(tmp_path / "out")])
-    assert refusal.value.code == 2
-    assert "error:" in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()
-
-
 def test_a_bench_does_not_write_over_a_campaign(campaign, capsys):
     before = (campaign / "test1.csv").read_bytes()
     assert main(["bench", "--out", str(campaign), "--seed", "4"]) == 2
@@ -208,16 +156,9 @@ def test_a_bench_does_not_write_over_a_campaign(campaign, capsys):
 
 
 @pytest.mark.parametrize("module", commands(["identification.commands"]).values())
-def test_every_option_says_what_it_sets_and_counts_are_checked(module, capsys):
+def test_every_option_says_what_it_sets(module):
     parser: argparse.ArgumentParser = parser_of(importlib.import_module(module), "epv")
     assert help_line(module).endswith(".")
     assert help_line(module) in parser.format_help()
     for action in parser._actions:
         assert action.help, action.dest
-        if action.dest in ("starts", "campaigns", "trials", "workers", "seed"):
-            with pytest.raises(SystemExit):
-                parser.parse_args([action.option_strings[0], "-1"])
-            assert (
-                f"argument {action.option_strings[0]}: -1 must be a whole number"
-                in capsys.readouterr().err
-            )

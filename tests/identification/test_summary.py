@@ -4,23 +4,29 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration.calibrate import Calibration
-from identification.pipeline.identification import ESTIMATOR, Identification
-from identification.pipeline.summary import common_reasons, judge_values, summary_section, worst
+from identification.pipeline.identification import (
+    ESTIMATOR,
+    Identification,
+    common_reasons,
+    judge_values,
+    summary_section,
+    worst,
+)
+from identification.recordings.recording import Campaign
 from identification.report.page import Table
 from identification.validation import Validation, validate
-from tests.identification.confidence.results import twin_confidence
-from tests.identification.twins import TRUE, calibration, problem, twin
+from tests.identification.twins import TRUE, calibration, problem, twin, twin_confidence
 
 
 def identification(
-    calibrated: Calibration | None = None, validation: Validation | None = None
-) -> Identification:
+    calibrated: Calibration | None = None, validation: Validation | None = None,
+    campaign: Campaign | None = None,
+) -> Identification:  # fmt: skip
     """Twin recordings that are already calibrated, so that a test takes no search."""
-    made = Identification(twin(), Path("not-written.jsonl"))
+    made = Identification(campaign or twin(), Path("not-written.jsonl"))
     found = calibrated or calibration()
     made.__dict__["calibration"] = found
     made.__dict__["confidence"] = replace(twin_confidence(), estimate=found.best(ESTIMATOR).z)
@@ -59,17 +65,10 @@ def test_a_model_that_misses_held_out_recordings_makes_all_values_doubtful():
 
 
 def test_without_a_held_out_recording_nothing_is_promised():
-    made = identification()
     kept = tuple(r for r in twin().recordings if r.role != "validation")
-    made = replace(made, campaign=replace(twin(), recordings=kept))
-    (reason,) = common_reasons(replace_results(made))
+    made = identification(campaign=replace(twin(), recordings=kept))
+    (reason,) = common_reasons(made)
     assert (reason.status, "no recording was held out" in reason.text) == ("doubt", True)
-
-
-def replace_results(made: Identification) -> Identification:
-    """The calibration again, for a copy forgets it."""
-    made.__dict__["calibration"] = calibration()
-    return made
 
 
 def test_a_search_that_has_not_converged_is_not_to_be_used():
@@ -77,8 +76,8 @@ def test_a_search_that_has_not_converged_is_not_to_be_used():
     assert [reason.status for reason in common_reasons(made)] == ["bad"]
 
 
-@pytest.mark.parametrize("symbol", ["R"])
-def test_only_the_value_at_an_end_of_its_domain_is_not_to_be_used(symbol):
+def test_only_the_value_at_an_end_of_its_domain_is_not_to_be_used():
+    symbol = "R"
     vector = calibration().problem.vector
     z = calibration().best(ESTIMATOR).z.copy()
     place = vector.symbols.index(symbol)

@@ -14,6 +14,7 @@ from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.calibrate import Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
+from identification.confidence.confidence import Confidence, assess_confidence
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
 TRUE = Parameters.calibrated()
@@ -75,3 +76,9 @@ def exact_problem() -> CalibrationProblem:
 def freed(*symbols: str) -> dict[str, Freedom]:
     """These parameters may move within their domains, and nothing is known of them before."""
     return dict.fromkeys(symbols, Freedom())
+
+
+@cache
+def twin_confidence() -> Confidence:
+    """The confidence stage on that calibration."""
+    return assess_confidence(calibration())

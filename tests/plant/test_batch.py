@@ -39,10 +39,8 @@ def run(fleet, u, members, threads=1):
     p, start = fleet
     members = np.asarray(members)
     chosen = {key: value[members] if np.ndim(value) else value for key, value in p.items()}
-    valves = Valves(len(members), threads=threads)
-    valves.set_parameters(np.arange(len(members)), chosen)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = np.broadcast_to(value, N)[members]
+    first = State(*(np.broadcast_to(value, N)[members] for value in start))
+    valves = Valves.started(len(members), chosen, first, threads=threads)
     return np.array(valves.record(Inputs(*(field[:, members] for field in u)), PERIOD))
 
 
@@ -86,10 +84,7 @@ def test_a_valve_that_fails_leaves_its_companions_alone(case):
 
 def test_advance_and_record_are_the_same():
     (p, start), u = fleet(), inputs(20)
-    valves = Valves(N)
-    valves.set_parameters(np.arange(N), p)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
+    valves = Valves.started(N, p, start)
     for period in range(20):
         for field, value in zip(valves.inputs, u, strict=True):
             field[:] = value[period]
@@ -100,11 +95,7 @@ def test_advance_and_record_are_the_same():
 
 def test_extremes_are_those_of_the_trajectory():
     """Against states recorded every 25 us: no step on trial that was given up leaves a trace."""
-    (p, start), u = fleet(), inputs(20)
-    valves = Valves(N)
-    valves.set_parameters(np.arange(N), p)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
+    valves, u = Valves.started(N, *fleet()), inputs(20)
     q = valves.record(Inputs(*(np.repeat(field, 200, axis=0) for field in u)), PERIOD / 200)
     lowest, highest = valves.tables.lowest[:N], valves.tables.highest[:N]
     np.testing.assert_allclose(highest, q.p2.max(axis=0), rtol=0, atol=5.0)
@@ -124,11 +115,7 @@ def test_trajectory_is_the_same_beside_valves_with_other_effects():
 def test_a_valve_that_was_given_up_is_not_tried_again():
     """Trying the 499 later periods of a valve whose mass is NaN as well would take minutes."""
     p = {**Parameters.calibrated(), "mMV": np.array([2e-3, np.nan])}
-    start = energised(p, p1=12e5, p2=6e5, U=24.0)
-    valves = Valves(2)
-    valves.set_parameters(np.arange(2), p)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
+    valves = Valves.started(2, p, energised(p, p1=12e5, p2=6e5, U=24.0))
     later = valves.record(Inputs(*np.zeros((7, 500, 1))), 5e-4)
     assert np.all(np.isfinite(later.p2[:, 0]))
     assert np.all(np.isnan(later.p2[:, 1]))

@@ -19,7 +19,7 @@ RESERVOIR = 0.02  # m^3, small so that it sags
 
 
 @cache
-def switched_at_random(restitution=0.0, reservoir=RESERVOIR):
+def switched_at_random(restitution=0.0):
     """N valves for 1 s under random switching, consumption and refill.
 
     Returns (parameters, states at the borders of the periods, inputs); fields of shape
@@ -27,10 +27,7 @@ def switched_at_random(restitution=0.0, reservoir=RESERVOIR):
     """
     rng = np.random.default_rng(1)
     p = CALIBRATED.replace(eMV=restitution, ePV=restitution)
-    valves = Valves(N)
-    valves.set_parameters(np.arange(N), p, reservoir)
-    for field, value in zip(valves.state, energised(p, p1=12e5, p2=6e5, U=24.0), strict=True):
-        field[:] = value
+    valves = Valves.started(N, p, energised(p, p1=12e5, p2=6e5, U=24.0), reservoir_volume=RESERVOIR)
     start = [field.copy() for field in valves.state]
     switches = rng.random((PERIODS, N)) < 0.08
     inputs = Inputs(
@@ -54,29 +51,17 @@ def total(flow):
     return np.vstack([np.zeros(N), np.cumsum(flow, axis=0)]) * PERIOD
 
 
-def test_the_run_is_one_in_which_things_happen():
-    _, q, _ = switched_at_random()
+def test_every_chamber_holds_what_came_in_less_what_went_out():
+    """Circuit, control chamber and reservoir; much happens in the run."""
+    p, q, u = switched_at_random()
+    consumed, refilled = total(u.sigma_S), total(u.refill)
+    np.testing.assert_allclose(mass(q.p2, p["V2"], p), q.air_in_PV - consumed, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(mass(q.p3, p["V3"], p), q.air_in_MV - q.air_vented, rtol=0, atol=1e-16)
+    drawn = q.air_in_PV + q.air_in_MV
+    np.testing.assert_allclose(mass(q.p1, RESERVOIR, p), refilled - drawn, rtol=0, atol=1e-13)
     assert np.max(q.air_in_PV) > 1e-3
     assert np.max(q.air_vented) > 1e-4
     assert np.min(q.p1) < 11.9e5
-
-
-def test_output_chamber_holds_what_came_in_less_what_was_consumed():
-    p, q, u = switched_at_random()
-    np.testing.assert_allclose(
-        mass(q.p2, p["V2"], p), q.air_in_PV - total(u.sigma_S), rtol=0, atol=1e-14
-    )
-
-
-def test_control_chamber_holds_what_came_in_less_what_was_vented():
-    p, q, _ = switched_at_random()
-    np.testing.assert_allclose(mass(q.p3, p["V3"], p), q.air_in_MV - q.air_vented, rtol=0, atol=1e-16)
-
-
-def test_reservoir_lacks_what_went_into_both_chambers_and_was_not_refilled():
-    p, q, u = switched_at_random()
-    expected = total(u.refill) - q.air_in_PV - q.air_in_MV
-    np.testing.assert_allclose(mass(q.p1, RESERVOIR, p), expected, rtol=0, atol=1e-13)
 
 
 @pytest.mark.parametrize("restitution", [0.0, 0.7])
@@ -89,11 +74,8 @@ def test_movers_stay_between_their_stops(restitution):
 
 def test_coil_energy_is_the_integral_of_electrical_power():
     fine = 50e-6
-    valves = Valves(1)
-    valves.set_parameters(np.arange(1), CALIBRATED)
     start = energised(CALIBRATED, p1=12e5, p2=6e5, U=0.0)._replace(xMV=0.0, p3=1e5)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
+    valves = Valves.started(1, CALIBRATED, start)
     U = np.full((400, 1), 24.0)
     q = valves.record(Inputs(U, *np.zeros((3, 1, 1))), fine)
     power = 24.0 * np.append(start.I, q.I)

@@ -50,14 +50,6 @@ def test_the_air_taken_is_the_area_of_the_trapezoids(period):
     assert taken == pytest.approx(1e-4 * duration + 10 * area, rel=1e-11)
 
 
-def test_a_step_is_the_flow_from_its_start_to_its_end():
-    found = flows([profile(start=0.1, hold=0.05, flow=2e-3)], 0.01, 0.3)[:, 0]
-    assert np.all(found[:10] == 0)
-    np.testing.assert_allclose(found[11:15], 2e-3, rtol=1e-12)
-    np.testing.assert_allclose(found[16:], 0, atol=1e-15)
-    assert np.sum(found) * 0.01 == pytest.approx(2e-3 * 0.05)
-
-
 @pytest.mark.parametrize("name", ["service", "pumping", "creeping"])
 def test_a_long_period_is_the_mean_of_its_parts(name):
     profiles = drawn(name, 8)

@@ -33,13 +33,9 @@ def test_a_pulse_acts_later_by_the_delay(periods):
     np.testing.assert_array_equal(found, PULSE[np.maximum(sent, 0)])
 
 
-def valve(n: int, t_delay) -> Valves:
-    valves = Valves(n)
-    valves.set_parameters(np.arange(n), {**CALIBRATED, "t_delay": np.broadcast_to(t_delay, n)})
+def valve(t_delay: float) -> Valves:
     start = energised(CALIBRATED, p1=12e5, p2=6.8e5, U=24.0)
-    for field, value in zip(valves.state, start, strict=True):
-        field[:] = value
-    return valves
+    return Valves.started(1, {**CALIBRATED, "t_delay": t_delay}, start)
 
 
 def recorded(valves: Valves, U, period: float) -> State:
@@ -47,23 +43,22 @@ def recorded(valves: Valves, U, period: float) -> State:
     return valves.record(Inputs(U[:, None], *np.zeros((3, len(U), 1))), period)
 
 
-@pytest.mark.parametrize("samples", [4])
-def test_a_recording_with_a_delay_is_that_of_the_shifted_voltage(samples):
+def test_a_recording_with_a_delay_is_that_of_the_shifted_voltage():
     """To the bit: a delay of whole samples leaves nothing to part."""
-    U, period = np.repeat(PULSE, 10), 5e-4
+    U, period, samples = np.repeat(PULSE, 10), 5e-4, 4
     shifted = np.concatenate([np.full(samples, U[0]), U[:-samples]])
-    later = recorded(valve(1, samples * period), U, period)
-    expected = recorded(valve(1, 0.0), shifted, period)
+    later = recorded(valve(samples * period), U, period)
+    expected = recorded(valve(0.0), shifted, period)
     for name, found, true in zip(State._fields, later, expected, strict=True):
         np.testing.assert_array_equal(found, true, err_msg=name)
     assert np.max(later.xPV) > 1e-3
-    assert np.max(np.abs(later.p3 - recorded(valve(1, 0.0), U, period).p3)) > 5e3
+    assert np.max(np.abs(later.p3 - recorded(valve(0.0), U, period).p3)) > 5e3
 
 
 def test_a_delay_within_a_period_is_that_of_finer_samples():
-    coarse = recorded(valve(1, 2e-3), PULSE, 5e-3)
+    coarse = recorded(valve(2e-3), PULSE, 5e-3)
     U = np.repeat(PULSE, 5)
-    fine = recorded(valve(1, 0.0), np.concatenate([U[:1], U[:1], U[:-2]]), 1e-3)
+    fine = recorded(valve(0.0), np.concatenate([U[:1], U[:1], U[:-2]]), 1e-3)
     for name in ("p2", "p3", "I"):
         true = getattr(fine, name)[4::5]
         np.testing.assert_allclose(getattr(coarse, name), true, rtol=1e-4, atol=1e-5, err_msg=name)
@@ -72,8 +67,8 @@ def test_a_delay_within_a_period_is_that_of_finer_samples():
 
 @pytest.mark.parametrize("delay", [2e-3, 5e-3, 7e-3])
 def test_periods_of_control_agree_with_the_recording(delay):
-    at_once = recorded(valve(1, delay), PULSE, 5e-3)
-    valves = valve(1, delay)
+    at_once = recorded(valve(delay), PULSE, 5e-3)
+    valves = valve(delay)
     for k, U in enumerate(PULSE):
         valves.inputs.U[:] = U
         valves.advance(5e-3)
@@ -85,7 +80,7 @@ def test_periods_of_control_agree_with_the_recording(delay):
 
 def test_a_pulse_shorter_than_the_delay_is_lost_when_controlled_in_periods():
     """A change back within the delay takes the change with it; documented at `Valves.advance`."""
-    valves = valve(1, 7e-3)
+    valves = valve(7e-3)
     for U in (24.0, 0.0, 24.0, 24.0, 24.0, 24.0):
         valves.inputs.U[:] = U
         valves.advance(5e-3)

@@ -6,6 +6,7 @@ from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import Region
+from epv_env.plant.runge_kutta import DEFAULT_STEP
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
 
@@ -26,16 +27,14 @@ def top(size: Size) -> float:
     return size.drawn[0] if size.stronger_when_smaller else size.drawn[1]
 
 
-def pressures(plants: list[Parameters], step: float | None = None, periods: int = PERIODS) -> np.ndarray:
+def pressures(
+    plants: list[Parameters], step: float = DEFAULT_STEP, periods: int = PERIODS
+) -> np.ndarray:
     """p2 and p3 of EACH valves of each plant under consumption, (periods, 2, plants, EACH) [Pa]."""
     n = EACH * len(plants)
-    valves = Valves(n)
-    valves.step = step or valves.step
     every = {symbol: np.repeat([p[symbol] for p in plants], EACH) for symbol in plants[0]}
-    valves.set_parameters(np.arange(n), every)
     first = energised(every, p1=np.full(n, 11e5), p2=np.full(n, 8e5), U=24.0)
-    for field, value in zip(valves.state, first, strict=True):
-        field[:] = value
+    valves = Valves.started(n, every, first, step=step)
     rng, on, found = np.random.default_rng(0), np.full(EACH, True), []
     for _ in range(periods):
         on ^= rng.random(EACH) < 0.2

@@ -9,7 +9,7 @@ import pytest
 import epv_env.plant
 from epv_env.plant.effects.law import SLOTS, Terms
 from epv_env.plant.effects.record import Constant, Effect, EffectError, Size
-from epv_env.plant.effects.registry import CONSTANTS, EFFECTS, LAWFUL, effect
+from epv_env.plant.effects.registry import CONSTANTS, EFFECTS, LAWFUL
 from epv_env.plant.parameters import Parameters, table
 
 PLANT = Path(epv_env.plant.__file__).parent
@@ -82,8 +82,3 @@ def test_what_a_record_lacks_is_one_sentence(change, sentence):
     with pytest.raises(EffectError, match=r"^effect 'new_force': ") as caught:
         replace(COMPLETE, **change)
     assert sentence in str(caught.value)
-
-
-def test_an_unknown_effect_is_named():
-    with pytest.raises(EffectError, match="unknown effect 'rust': known are coil_heating"):
-        effect("rust")

@@ -104,10 +104,8 @@ def test_air_is_conserved_with_every_effect_on():
     p = CALIBRATED
     for name in CATALOGUE:
         p = p.replace(**{s: sized(name, 0.1)[s] for s in CATALOGUE[name]})
-    valves = Valves(1)
-    valves.set_parameters(np.arange(1), p, 0.02)
-    for field, value in zip(valves.state, energised(p, p1=12e5, p2=6e5, U=24.0), strict=True):
-        field[:] = value
+    initial = energised(p, p1=12e5, p2=6e5, U=24.0)
+    valves = Valves.started(1, p, initial, reservoir_volume=0.02)
     start = State(*(field.copy() for field in valves.state))
     U = np.where(np.arange(200) % 50 < 25, 0.0, 24.0)[:, None]
     end = valves.record(Inputs(U, *np.zeros((3, 200, 1))), 5e-3)
@@ -124,10 +122,7 @@ def test_air_is_conserved_with_every_effect_on():
 @numba.njit
 def _magnet(q, u, c, e):
     inverse_Rm = reluctance_inverse(q, c)
-    return (
-        current_rate(q, u, c, inverse_Rm, e, True),
-        armature_force(q, c, inverse_Rm, e, True),
-    )
+    return (current_rate(q, u, c, inverse_Rm, e, True), armature_force(q, c, inverse_Rm, e, True))
 
 
 def test_a_saturating_magnet_with_remanence_conserves_energy():
@@ -286,6 +281,17 @@ def test_a_leak_of_the_circuit_is_exponential_while_it_chokes():
     per_pressure = -float(mass_flux(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
     expected = 8e5 * np.exp(-RT / p["V2"] * 2e-7 * per_pressure * run.time)
     np.testing.assert_allclose(run.state.p2, expected, rtol=1e-6)
+
+
+@pytest.mark.parametrize(("beside", "wider"), [(0.0, 0.0), (1.0, 2e-8)])
+def test_a_leak_beside_the_seat_goes_on_while_the_seat_is_open(beside, wider):
+    """The chamber vents exponentially while the exhaust chokes, by its bore and what lies beside."""
+    p = CALIBRATED.replace(A_exh=2e-8, wA_exh=beside, V3=2e-5)
+    run = simulate(p, initial=energised(p, p1=12e5, p2=8e5, U=24.0), U=np.zeros(101), period=1e-3)
+    per_pressure = -float(mass_flux.py_func(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
+    area = float(coefficients(p)[Coefficients._fields.index("orifice_exh"), 0]) + wider
+    slope = np.diff(np.log(run.state.p3[50:])) / 1e-3  # the armature has landed
+    np.testing.assert_allclose(slope, -RT / p["V3"] * area * per_pressure, rtol=1e-6)
 
 
 def test_orifices_choke_where_the_effect_says():

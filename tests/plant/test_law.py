@@ -99,17 +99,6 @@ def test_a_law_multiplies_the_strengths_of_its_effect_and_nothing_else(name):
     assert found._asdict() == {**e._asdict(), **expected}
 
 
-def test_air_is_conserved_where_a_leak_has_a_law():
-    p, volume = CALIBRATED.replace(A_PV=5e-7, **law("seat_leak", "p1 - p2")), 0.02
-    start = energised(p, p1=12e5, p2=6e5, U=24.0)
-    run = simulate(p, initial=start, U=np.full(400, 24.0), period=5e-3, reservoir_volume=volume)
-    q, RT = run.state, p["R_gas"] * p["T_env"]
-    assert q.air_in_PV[-1] > 5e-4
-    np.testing.assert_allclose((q.p2 - q.p2[0]) * p["V2"] / RT, q.air_in_PV, rtol=0, atol=1e-14)
-    lost = (q.p1[0] - q.p1) * volume / RT
-    np.testing.assert_allclose(lost, q.air_in_PV + q.air_in_MV, rtol=0, atol=1e-13)
-
-
 def test_laws_travel_in_a_plant_file_and_act_in_the_environment(tmp_path):
     path, last, own = tmp_path / "plant.json", [], CALIBRATED.replace(F_PV=8.0, cflow=0.5)
     for p in (own, own.replace(**law("piston_friction"), **law("flow_force", "xPV", slot=2))):

@@ -68,27 +68,21 @@ def test_the_venting_rate_is_that_of_choked_flow():
     assert venting_rate(p) == pytest.approx(expected, rel=1e-6)
 
 
+def with_domains(**given):
+    """Fields for parameters of a value and a domain."""
+    values = {symbol: value for symbol, (value, *_) in given.items()}
+    return {"parameters": values, "domains": {symbol: ends for symbol, (_, *ends) in given.items()}}
+
+
 @pytest.mark.parametrize(
     ("fields", "message"),
     [
         ({"domains": {"R": [14, 10]}}, r"domain \[14, 10\] Ohm of R .* give low < high inside"),
         ({"domains": {"V2": [10, 30]}}, r"V2 is none of a valve of this kind, .* in SI units"),
         ({"domains": {"kappa": [1.3, 1.5]}}, "kappa is a constant and has no domain: leave it out"),
-        (
-            {
-                "parameters": {"d1": 0.006, "d2": 0.007},
-                "domains": {"d1": [5e-3, 9e-3], "d2": [5e-3, 9e-3]},
-            },
-            "d2 = 0.007 m must be less than d1 = 0.006 m",
-        ),
-        (
-            {"parameters": {"cPV": 50000}, "domains": {"cPV": [40000, 60000]}},
-            r"the piston never opens: .* check their units",
-        ),
-        (
-            {"parameters": {"N": 100}, "domains": {"N": [90, 650]}},
-            r"12 V and 1 A leave a net -.* N, so the coil never pulls in its armature: check N",
-        ),
+        (with_domains(d1=(0.006, 5e-3, 9e-3), d2=(0.007, 5e-3, 9e-3)), "d2 = 0.007 m must be less than"),
+        (with_domains(cPV=(5e4, 4e4, 6e4)), r"the piston never opens: .* check their units"),
+        (with_domains(N=(100, 90, 650)), r"12 V and 1 A leave a net -.* N, so the coil .*: check N"),
         ({"voltage_V": 24}, r"voltage_V = 24 must be positive and within the voltage sensor's range"),
         ({"sensors": {"I": {"high": 0.9}}}, r"voltage_V / R = 1 A exceeds the current sensor's range"),
         ({"sensors": {"p1": {"high": 1.5}}}, r"sensors.p1.high = 1.5 bar lies below 1.89 bar"),

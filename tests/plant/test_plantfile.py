@@ -117,6 +117,9 @@ def test_what_json_cannot_hold_leaves_the_old_file(tmp_path):
     assert load_plant(tmp_path / "plant.json").name == "bench 7"
 
 
+JOINT_R = {"symbols": ["R"], "chi_square": 1}
+
+
 @pytest.mark.parametrize(
     ("content", "message"),
     [
@@ -128,10 +131,7 @@ def test_what_json_cannot_hold_leaves_the_old_file(tmp_path):
         ({"region": {"boxes": {"x": [1, 2]}}}, "unknown parameter 'x'"),
         ({"region": {"boxes": {"R": [42, 41]}}}, "range of R is"),
         ({"region": {"joint": {"symbols": ["R"]}}}, "field 'covariance' is missing"),
-        (
-            {"region": {"joint": {"symbols": ["R"], "covariance": [[-1]], "chi_square": 1}}},
-            "positive semi-definite 1 x 1",
-        ),
+        ({"region": {"joint": {**JOINT_R, "covariance": [[-1]]}}}, "positive semi-definite 1 x 1"),
         ({"alternatives": [{"parameters": {}}]}, r"alternatives\[0\]: field 'probability' is missing"),
         ({"alternatives": [{"parameters": {}, "probability": 0.5}]}, "have the sum 0.5: make it 1"),
         (

@@ -73,12 +73,6 @@ def test_ten_percent_is_ten_percent_cut_at_the_domain(name, symbols):
         assert (low, high) == pytest.approx(expected, rel=1e-12)
 
 
-def test_a_draw_changes_nothing_but_its_symbols():
-    drawn = joint().draw(np.random.default_rng(0))
-    changed = {symbol for symbol in drawn if drawn[symbol] != CENTRE[symbol]}
-    assert changed == set(SYMBOLS)
-
-
 def test_joint_draws_fill_their_ellipsoid_uniformly():
     """The volume inside a Mahalanobis radius r goes with r^4, so (d2/chi2)^2 is uniform on [0, 1]."""
     change = standard_offsets()

@@ -54,18 +54,16 @@ def report_tests(parameters: Parameters, U_on: float = 24.0) -> dict[str, Schedu
     }
 
 
-def plant_states(
-    schedule: Schedule, times: ArrayLike, *, step: float = DEFAULT_STEP, threads: int | None = 1
-) -> State:
+def plant_states(schedule: Schedule, times: ArrayLike, *, step: float = DEFAULT_STEP) -> State:
     """The plant's states at `times` [s], fields of shape (times,).
 
     Every time has a valve of its own, which stops there: so samples shorten no step but the last.
     """
     times = np.asarray(times, dtype=float)
-    valves = Valves(len(times), step=step, threads=threads)
-    valves.set_parameters(np.arange(len(times)), schedule.parameters, schedule.reservoir_volume)
-    for field, value in zip(valves.state, schedule.initial, strict=True):
-        field[:] = value
+    valves = Valves.started(
+        len(times), schedule.parameters, schedule.initial, reservoir_volume=schedule.reservoir_volume,
+        step=step, threads=1,
+    )  # fmt: skip
     for segment, (start, end) in enumerate(
         zip(schedule.borders[:-1], schedule.borders[1:], strict=True)
     ):

@@ -1,8 +1,14 @@
-"""Studies write the generated parts of their pages, a trial run those of a copy."""
+"""Studies write the generated parts of their pages, and their short forms run."""
 
+import json
+
+import numpy as np
 import pytest
 
 from docs.studies.common import fill, study_options, study_parser, table
+from docs.studies.coverage.study import coverage, main
+from docs.studies.logs import study
+from identification.recordings.log_files import read_log
 
 PAGE = "# Speed\n\n<!-- generated: rows -->\nold\n<!-- end: rows -->\n\nWritten by hand.\n"
 
@@ -35,3 +41,51 @@ def test_a_trial_run_works_on_a_copy_of_the_page(tmp_path):
     assert (folder / "README.md").read_text() == PAGE
     assert "new" in (out / "README.md").read_text()
     assert options.work == out
+
+
+def test_shares_are_those_of_known_distances():
+    """Squared distances of chi-square's law: 95 % lie in the region, fewer if they are doubled."""
+    distance = np.random.default_rng(0).chisquare(4, 2000)
+    campaigns = [
+        {
+            "symbols": ["a", "b", "c", "d"], "distance": d, "independent": 2 * d, "disagreement": d,
+            "inside": [True, True, True, False], "report_inside": [True] * 4, "report_joint": True,
+        }
+        for d in distance
+    ]  # fmt: skip
+    found = coverage(campaigns)
+    assert found["joint region"]["low"] < 0.95 < found["joint region"]["high"]
+    assert found["joint region if residuals were independent and inputs exact"]["high"] < 0.9
+    assert found["interval of d"]["share"] == 0.0
+
+
+@pytest.mark.slow
+def test_the_short_form_writes_results_and_page(tmp_path):
+    assert main(["--quick", "--out", str(tmp_path)]) == 0
+    found = json.loads((tmp_path / "coverage.json").read_text(encoding="utf-8"))
+    assert set(found) >= {"joint region", "interval of alphaMV"}
+    assert "| joint region |" in (tmp_path / "README.md").read_text(encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_a_deviating_law_changes_what_is_logged_and_none_does_not(tmp_path, monkeypatch):
+    monkeypatch.setattr(study, "DURATION", 1.0)
+    valve = study.drawn(0) | {"seeds": [3], "effects": {"control_chamber_heat": {"tau_3": 0.01}}}
+
+    def logged(name: str, **changes: float) -> np.ndarray:
+        study.log_drives(valve | changes, tmp_path / name)
+        return read_log(tmp_path / name).drives[0].p3
+
+    none, strong = logged("none", deviation=0.0), logged("strong", deviation=0.5)
+    monkeypatch.setattr(study, "deviate", lambda valves, deviation: None)
+    plain = logged("plain")
+    assert np.max(np.abs(none - plain)) < 500.0  # Pa: a reading's last digit is 10
+    assert np.max(np.abs(strong - plain)) > 5e3
+
+
+@pytest.mark.slow
+def test_the_short_form_writes_the_page(tmp_path):
+    assert study.main(["--quick", "--out", str(tmp_path)]) == 0
+    text = (tmp_path / "README.md").read_text(encoding="utf-8")
+    assert "| Valves, each driven for five minutes | 1 |" in text
+    assert study.main(["--quick", "--out", str(tmp_path)]) == 0  # from the journal alone

@@ -1,4 +1,4 @@
-"""The training command: the whole job in its short form, and one clear sentence for a wrong input."""
+"""Commands of training: the whole job in its short form, and what `epv log` and `epv watch` write."""
 
 import json
 import shutil
@@ -10,7 +10,12 @@ from subprocess import CompletedProcess
 import pytest
 
 pytest.importorskip("stable_baselines3")
+import numpy as np
+from PIL import Image
+
 from epv_env.common.commands import main_of
+from identification.recordings.log_files import read_log
+from training.commands.watch import FRAME_PERIODS, SIZE
 from training.learners.ppo import read_rows
 
 pytestmark = pytest.mark.training
@@ -59,22 +64,18 @@ def test_the_policy_says_where_it_comes_from(finished):
     assert provenance["timesteps"] in [row["timesteps"] for row in read_rows(out)]
 
 
-def test_a_resumed_run_needs_the_same_options(finished):
-    out, _ = finished
-    result = train(*SHORT, "--out", out, "--resume", "--seed", 5)
-    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
-    assert "resume with the same" in result.stderr
-
-
-def test_a_resumed_run_needs_the_same_plant(finished, tmp_path):
-    """Not only a file of the same name."""
+def test_a_resumed_run_needs_the_same_options_and_plant(finished, tmp_path):
+    """Not only a plant file of the same name."""
     out = Path(shutil.copytree(finished[0], tmp_path / "ppo"))
     config = json.loads((out / "config.json").read_text())
     config["plant"]["voltage_V"] = 18.0
     (out / "config.json").write_text(json.dumps(config))
-    result = train(*SHORT, "--out", out, "--resume")
-    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
-    assert "the plant is another than" in result.stderr
+    for where, more, said in (
+        (finished[0], ["--seed", 5], "resume with the same"), (out, [], "the plant is another than")
+    ):  # fmt: skip
+        result = train(*SHORT, "--out", where, "--resume", *more)
+        assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+        assert said in result.stderr
 
 
 def test_a_finished_run_is_not_overwritten_unasked(finished):
@@ -86,21 +87,33 @@ def test_a_finished_run_is_not_overwritten_unasked(finished):
     assert (out / "policy.safetensors").read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
-        (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
-        (["--parameters", "diagnosis"], "has no alternatives to draw from"),
-        (["--timesteps", "0"], "--timesteps"),
-        (["--switching-price", "-1"], "must be a number from 0 to 1000"),
-        (["--resume"], "nothing to resume"),
-    ],
-)
-def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path):
-    out = tmp_path / "out"
-    result = train("--quick", *arguments, "--out", out)
-    assert result.returncode == 2
-    assert words in result.stderr
-    assert "Traceback" not in result.stderr
-    assert not (out / "config.json").exists()
+def log(*words: object) -> int:
+    """Run `epv log` under a simple controller, two drives of a second unless the words say otherwise."""
+    line = ["--controller", "hysteresis", "--drives", 2, "--duration", 1.0, *words]
+    return main_of("training.commands.log", program="epv log", arguments=[str(word) for word in line])
+
+
+def test_an_effect_acts_from_its_drive_on(tmp_path):
+    assert log("--out", tmp_path / "as-it-is") == 0
+    assert log("--out", tmp_path / "late", "--effect", "command_delay", "--from-drive", 2) == 0
+    same, other = (
+        [drive.p3 for drive in read_log(tmp_path / name).drives] for name in ("as-it-is", "late")
+    )
+    np.testing.assert_array_equal(same[0], other[0])
+    assert len(same[1]) == len(other[1]) == 200
+    assert np.any(same[1] != other[1])
+
+
+WATCH = "training.commands.watch"
+
+
+@pytest.mark.parametrize("controller", ["hysteresis", "PWM", "PPO", "informed pulse"])
+def test_a_film_has_a_frame_for_every_other_period(controller, tmp_path, monkeypatch):
+    pytest.importorskip("pygame")
+    monkeypatch.setenv("SDL_VIDEODRIVER", "dummy")
+    path = tmp_path / "valve.gif"
+    arguments = [controller, "--file", str(path), "--duration", "0.08"]
+    assert main_of(WATCH, program="epv watch", arguments=arguments) == 0
+    with Image.open(path) as film:
+        periods = 4 if controller == "PWM" else 16
+        assert (film.size, film.n_frames) == (SIZE, periods // FRAME_PERIODS)  # type: ignore[attr-defined]

@@ -16,7 +16,7 @@ from epv_env.plant.plantfile import Plant, save_plant
 from training.evaluation import batches
 from training.evaluation.batches import Batch, in_batches, run_batches
 from training.evaluation.rollout import run_episodes
-from training.evaluation.scenarios import EVALUATION, EvaluationScenario
+from training.evaluation.scenarios import EVALUATION
 from training.studies.comparison import PLANTS, as_text, compare, differences, rows
 
 pytestmark = pytest.mark.training
@@ -48,12 +48,6 @@ def results():
     return compare({"good": GOOD, "late": LATE}, plant=PLANT, scenarios=STEPS, episodes=24, duration=3.0)
 
 
-def test_an_episode_depends_on_its_seed_alone():
-    many = run_episodes(GOOD, seeds=list(range(20)), duration=1.0, options={"scenario": "steps"})
-    alone = run_episodes(GOOD, seeds=[7], duration=1.0, options={"scenario": "steps"})
-    assert many.episode_return[7] == alone.episode_return[0]
-
-
 def test_a_restart_makes_the_controller_forget_once_at_its_time():
     controller = Recorder()
     run_episodes(controller, seeds=[1, 2], duration=0.1, options={}, restart_s=0.05)
@@ -62,14 +56,7 @@ def test_a_restart_makes_the_controller_forget_once_at_its_time():
 
 def test_batches_hold_the_episodes_of_one_run(monkeypatch):
     options = {"plant": PLANT, "scenario": "steps"}
-    whole = Batch(
-        name="w",
-        controller="good",
-        first_seed=5,
-        episodes=5,
-        duration=0.8,
-        options=options,
-    )
+    whole = Batch(name="w", controller="good", first_seed=5, episodes=5, duration=0.8, options=options)
     (at_once,) = run_batches([whole], {"good": GOOD}, what="test")
     monkeypatch.setattr(batches, "BATCH_EPISODES", 2)
     assert [part.episodes for part in in_batches(whole)] == [2, 2, 1]
@@ -106,19 +93,6 @@ def test_differences_are_paired_and_have_a_sign(results):
     assert row["difference"] == pytest.approx(1e3 * np.mean(both[0] - both[1]))
     assert row["low"] < row["difference"] < row["high"] < 0
     assert table.loc[("calibrated", "share that leaves [%]"), "difference"] < 0
-
-
-def test_a_scenario_may_have_its_own_length():
-    """A circuit that nothing is drawn from ends an episode as short as the scenario says."""
-    found = [
-        compare(
-            {"good": GOOD}, plant=PLANT, plant_sets=["calibrated"], episodes=2, duration=1.0,
-            scenarios={"s": EvaluationScenario(options={"scenario": "none"}, duration=d)},
-        )
-        for d in (None, 0.6)
-    ]  # fmt: skip
-    long, short = (each["calibrated", "s", "good"].episode_return for each in found)
-    assert np.all(long < short)
 
 
 def command(*arguments):
@@ -169,20 +143,3 @@ def test_a_plant_of_another_voltage_has_figures_of_its_own(tmp_path):
     one, other = ((tmp_path / name / "finished.jsonl").read_bytes() for name in ("one", "other"))
     assert one == other
     assert b'"voltage_V": 18.0' in one
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--controllers", "nobody"], "no controller 'nobody': give PPO, hysteresis"),
-        (["--scenarios", "flood"], "no scenario 'flood'"),
-        (["--against", "nobody"], "--against 'nobody' takes no part"),
-        (["--plant", "nowhere.json"], "cannot read plant file nowhere.json"),
-        (["--seed", "999999"], "give one up to 999992"),
-        (["--device", "cuda"], "needs an NVIDIA accelerator"),
-    ],
-)
-def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path, capsys):
-    assert command("--out", tmp_path / "out", *arguments) == 2
-    assert words in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()

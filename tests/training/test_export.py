@@ -206,21 +206,6 @@ def test_the_controller_behind_the_check_of_p3_takes_over(fitted, tmp_path):
     assert np.mean(follow(CompiledPolicy(code=code), states) == wanted) >= 0.999
 
 
-def test_a_reading_that_is_not_a_number_counts_as_the_one_before(exported, tmp_path):
-    code = library(["cc"], copied(exported[1], tmp_path))
-    along = visit(GOOD, first_seed=5, episodes=1, periods=3)
-    row, found = INDEX["p3"], []
-    for instead in (np.nan, along.observations[0, 0, row]):
-        controller = CompiledPolicy(code=code)
-        controller.reset(1)
-        controller.act(along.observations[:, 0])
-        second = along.observations[:, 1].copy()
-        second[0, row] = instead
-        found.append((controller.act(second), controller.memory["valve"].tobytes(), controller.memory))
-    assert found[0][:2] == found[1][:2]
-    assert [each["senses"]["lost"].tolist() for *_, each in found] == [[1], [0]]
-
-
 def test_the_contract_says_what_the_files_hold(exported, tmp_path):
     """The size of the memory in C's own word."""
     policy, out = exported

@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here"),
 ]
 
-READINGS = 1_000_000
+READINGS = 400_000
 
 DRIVE = """
 #include <math.h>
@@ -194,18 +194,10 @@ def test_no_reading_opens_above_the_band_nor_keeps_shut_below_it_nor_a_lost_one_
 
 def damaged(observations, rng):
     """Observations (episodes, periods, entries), in each episode two failures of some channels."""
-    wide, rails = (
-        observations.astype(float),
-        [each.sensor.constants()[3:] for each in (P1, P2, P3, CURRENT)],
-    )
-    target = decode(wide, "target")
-    read = [
-        decode(wide, "p1"),
-        decode(wide, "p2_error") + target,
-        decode(wide, "p3"),
-        decode(wide, "I"),
-        target,
-    ]
+    wide = observations.astype(float)
+    rails = [each.sensor.constants()[3:] for each in (P1, P2, P3, CURRENT)]
+    p1, error, p3, current, target = (decode(wide, n) for n in ("p1", "p2_error", "p3", "I", "target"))
+    read = [p1, error + target, p3, current, target]
     with np.errstate(all="ignore"):
         for episode in range(len(wide)):
             for begins in rng.integers(1, wide.shape[1] - 50, 2):

@@ -22,15 +22,10 @@ from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import sentence_of
-from training.evaluation.metrics import EpisodeMetrics
 from training.learners import ppo
 from training.learners.actor import network_of
-from training.learners.environment import (
-    REWARD_SCALE,
-    make_training_env,
-    training_weights,
-)
-from training.learners.ppo import Task, checkpoints, make_model, read_rows, score, train
+from training.learners.environment import REWARD_SCALE, make_training_env, training_weights
+from training.learners.ppo import Task, checkpoints, make_model, read_rows, train
 
 pytestmark = pytest.mark.training
 TASK = Task(plant=Plant.calibrated())
@@ -44,7 +39,7 @@ def env():
     )
 
 
-def test_the_written_network_is_the_actor_that_is_trained(env):
+def test_the_written_network_is_the_actor_that_is_trained_and_begins_with_the_advice(env):
     model = make_model(env, seed=3)
     inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
     with torch.no_grad():
@@ -53,13 +48,9 @@ def test_the_written_network_is_the_actor_that_is_trained(env):
     logits = network_of(model).logits(inputs)
     difference = np.diff(logits, axis=1) - np.diff(expected, axis=1)  # torch normalises its logits
     assert np.max(np.abs(difference)) < 1e-5
-
-
-def test_before_training_the_policy_acts_as_the_advice(env):
-    inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
     inputs[:, -1] = np.sign(inputs[:, -1])
-    logits = network_of(make_model(env, seed=3)).logits(inputs)
-    assert np.array_equal(np.argmax(logits, axis=1), (inputs[:, -1] > 0).astype(int))
+    begins = np.argmax(network_of(model).logits(inputs), axis=1)
+    assert np.array_equal(begins, (inputs[:, -1] > 0).astype(int))
 
 
 def test_training_is_stricter_than_the_reward_and_follows_its_prices():
@@ -81,19 +72,6 @@ def test_rewards_are_scaled_and_the_monitor_counts_them_as_they_are(env):
     i = ended[0]
     assert infos[i]["episode"]["r"] * REWARD_SCALE == pytest.approx(total[i], rel=1e-3)
     assert infos[i]["terminal_observation"].shape == env.observation_space.shape
-
-
-def metrics(returns, stayed) -> EpisodeMetrics:
-    """Metrics of which only return and staying count."""
-    names = EpisodeMetrics.__dataclass_fields__
-    zeros = {name: np.zeros(len(returns)) for name in names}
-    given = {"episode_return": np.array(returns), "stayed": np.array(stayed)}
-    return EpisodeMetrics(**{**zeros, **given})
-
-
-def test_an_episode_that_leaves_costs_more_than_a_good_one_loses():
-    good, leaving = metrics([-150.0] * 4, [True] * 4), metrics([-120.0] * 4, [True, True, True, False])
-    assert score(good) > score(leaving)
 
 
 def stop(course: ppo.Course) -> bool:

@@ -1,9 +1,12 @@
-"""The control aims' figures, against episodes whose figures are known."""
+"""The control aims' figures of known episodes, their intervals and differences; seeds by purpose."""
+
+from itertools import pairwise
 
 import numpy as np
 import pytest
 
 from epv_env.result import CONSUMPTION, DEVIATION, FAILED, N_FIGURE, REWARD, SWITCHINGS, VENTED
+from training.evaluation import seeds
 from training.evaluation.metrics import (
     METER,
     EpisodeMetrics,
@@ -12,6 +15,7 @@ from training.evaluation.metrics import (
     tail_excursion,
     violation_interval,
 )
+from training.evaluation.statistics import MANY, mean_interval, paired_difference
 
 PERIOD = 0.1
 
@@ -40,19 +44,19 @@ def test_figures_of_a_known_episode():
     assert m.stayed[0]
 
 
-def test_what_happens_before_settling_does_not_count():
-    assert run([-3.0, 0.1], settling_time=PERIOD).stayed[0]
-    assert not run([0.1, -3.0], settling_time=PERIOD).stayed[0]
-
-
-def test_overshoot_is_an_excursion_but_no_breakdown():
-    m = run([0.6])
-    assert not m.stayed[0]
-    assert m.breakdown_bar[0] == 0.0
-
-
-def test_a_failed_episode_has_not_stayed():
-    assert not run([0.0, 0.0], failed=1).stayed[0]
+@pytest.mark.parametrize(
+    ("deviations", "options", "stayed"),
+    [
+        ([-3.0, 0.1], {"settling_time": PERIOD}, True),
+        ([0.1, -3.0], {"settling_time": PERIOD}, False),
+        ([0.6], {}, False),
+        ([0.0, 0.0], {"failed": 1}, False),
+    ],
+)
+def test_who_leaves_after_settling_or_fails_has_not_stayed(deviations, options, stayed):
+    found = run(deviations, **options)
+    assert found.stayed[0] == stayed
+    assert (found.breakdown_bar[0] > 0) == (not stayed and deviations[-1] < 0)  # an overshoot is none
 
 
 def test_an_episode_ends_with_the_period_of_its_failure():
@@ -110,3 +114,49 @@ def test_episodes_join_and_their_events_weigh_equally():
     assert len(both) == 2
     assert summary(both)["C2_event_breakdown_bar"] == pytest.approx((0.3 + 3 * 0.1) / 4)
     assert len(both.first(1)) == 1
+
+
+def test_95_percent_intervals_of_a_normal_mean_hold_it_about_as_often():
+    rng = np.random.default_rng(1)
+    ends = [mean_interval(rng.standard_normal(60)) for _ in range(150)]
+    held = np.mean([low <= 0.0 <= high for low, high in ends])
+    assert 0.90 <= held <= 0.985
+
+
+def test_the_interval_of_many_is_that_of_resampling(monkeypatch):
+    values = np.random.default_rng(0).exponential(size=MANY + 1)
+    many = mean_interval(values)
+    monkeypatch.setattr("training.evaluation.statistics.MANY", len(values))
+    assert many == pytest.approx(mean_interval(values), abs=0.05 * np.ptp(many))
+
+
+def test_pairing_takes_away_what_both_met():
+    rng = np.random.default_rng(0)
+    met = 10 * rng.standard_normal(200)
+    ours, theirs = met + 0.1 * rng.standard_normal(200), met + 1.0
+    found = paired_difference(ours, theirs)
+    assert found.value == pytest.approx(-1.0, abs=0.05)
+    assert found.low < found.value < found.high
+    assert found.high - found.low < 0.1
+
+
+def test_the_first_episodes_pair_where_one_has_fewer():
+    assert paired_difference(np.zeros(10), np.ones(3)).value == -1.0
+
+
+def test_the_ranges_do_not_meet():
+    firsts = sorted(seed for name, seed in vars(seeds).items() if name.endswith("_SEED"))
+    assert min(b - a for a, b in pairwise(firsts)) >= seeds.RANGE
+
+
+def test_a_training_stays_in_its_range_and_each_has_its_own_episodes():
+    firsts = {seeds.first_training_seed(seed, steps, 1024) for seed in range(40) for steps in (0, 10**6)}
+    assert len(firsts) == 80
+    assert min(firsts) >= seeds.TRAINING_SEED
+    assert max(firsts) + 1024 <= seeds.TRAINING_SEED + seeds.RANGE
+
+
+def test_episodes_beyond_their_range_are_refused():
+    seeds.check_first_seed(995_904, 4096)
+    with pytest.raises(ValueError, match="with 4096 episodes give one up to 995904"):
+        seeds.check_first_seed(995_905, 4096)

@@ -63,10 +63,7 @@ def test_a_changed_module_is_another_controller(folder):
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        (
-            "nobody",
-            "no controller 'nobody': give PPO, hysteresis, extrapolating hysteresis, PWM, adaptive",
-        ),
+        ("nobody", "no controller 'nobody': give PPO, hysteresis, extrapolating hysteresis, PWM, adap"),
         ("nowhere:Relay", "No module named 'nowhere': give MODULE:CLASS of a module in"),
         ("faulty:Relay", "module faulty has no class Relay"),
         ("faulty:SOMETHING", "module faulty has no class SOMETHING"),
@@ -93,14 +90,14 @@ def test_every_name_of_the_table_is_a_controller():
     assert not any("," in name for name in names)
 
 
-def test_two_controllers_of_one_label_are_refused():
-    with pytest.raises(ValueError, match="two controllers are called 'hysteresis'"):
-        named_controllers(["hysteresis", "hysteresis"], PLANT)
-
-
 @pytest.mark.parametrize(
     ("source", "imports"),
     [("a.b:C", True), ("a:C", True), ("a", False), ("C:/a", False), ("x=/p:C", False), (":C", False)],
 )
 def test_an_import_is_told_from_a_folder(source, imports):
     assert is_import(source) == imports
+
+
+def test_two_controllers_of_one_label_are_refused():
+    with pytest.raises(ValueError, match="two controllers are called 'hysteresis'"):
+        named_controllers(["hysteresis", "hysteresis"], PLANT)

@@ -7,12 +7,10 @@ pytest.importorskip("pandas")
 
 from controllers.hysteresis import Hysteresis
 from epv_env.common.units import BAR
-from epv_env.plant.consumption import Profiles, draw_profile
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import REFERENCE_PERIOD
 from epv_env.settings import make_settings
-from epv_env.signals import RecordedConsumption
 from training.evaluation.rollout import begin_episodes, make_env, run_episodes
 from training.evaluation.scenarios import (
     BEYOND,
@@ -22,53 +20,32 @@ from training.evaluation.scenarios import (
     TUNING_REGION,
     VENTED_DROP_BAR,
     effect_levels,
-    scenario_group,
     worn_scenarios,
 )
 
 pytestmark = pytest.mark.training
-
-CONTROLLER = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03)
-TIME = np.arange(0.0, 10.0, 0.005)
 
 
 def settings(name):
     return make_settings(Plant.calibrated(), control_period=0.005, **EVALUATION[name].options)
 
 
-def flow(name, seed=0):
-    """Consumption over 10 s [g/s]."""
-    profiles = Profiles(1)
-    scenario = settings(name).scenario
-    assert not isinstance(scenario, RecordedConsumption)
-    profiles.start(0, draw_profile(scenario, np.random.default_rng(seed)))
-    return np.array([1e3 * profiles.mean_flow(np.array([t]), 0.005)[0] for t in TIME])
-
-
-def test_a_scenario_has_the_same_text_in_every_process():
-    """It belongs to the subject of a journal: with an address, a comparison would begin anew."""
-    for scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.values():
-        assert " at 0x" not in repr(scenario)
-
-
 def test_the_environment_accepts_every_scenario():
     for name, scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.items():
+        assert " at 0x" not in repr(scenario)  # the subject of a journal: an address would begin it anew
         options = {"control_period": REFERENCE_PERIOD, "parameters": TUNING_REGION, **scenario.options}
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name
 
 
-class Shut(Hysteresis):
-    """Keeps the coil on, which shuts the valve."""
+class Always(Hysteresis):
+    """Keeps the coil on, which shuts the valve, or off, which opens it."""
+
+    def __init__(self, on: bool):
+        super().__init__(open_below=-0.1, shut_above=0.0)
+        self.on = on
 
     def act(self, observations):
-        return np.ones(len(observations), dtype=int)
-
-
-class Open(Hysteresis):
-    """Keeps the coil off, which opens the valve."""
-
-    def act(self, observations):
-        return np.zeros(len(observations), dtype=int)
+        return np.full(len(observations), int(self.on))
 
 
 def test_an_open_valve_refills_within_the_settling_time():
@@ -76,9 +53,7 @@ def test_an_open_valve_refills_within_the_settling_time():
         "parameters": TUNING_REGION, "drop_bar": (4.4, 4.4), "scenario": "none",
         "settling_time": REFILL_TIME,
     }  # fmt: skip
-    metrics = run_episodes(
-        Open(open_below=-0.1, shut_above=0.0), seeds=list(range(16)), duration=2.0, options=options
-    )
+    metrics = run_episodes(Always(on=False), seeds=list(range(16)), duration=2.0, options=options)
     assert np.all(metrics.breakdown_bar < 0.5)
 
 
@@ -95,8 +70,7 @@ def highest_error(controller, duration, **options):
 @pytest.mark.parametrize(("drop", "avoidable"), [(VENTED_DROP_BAR[0], True), (0.3, False)])
 def test_a_vented_valve_can_be_shut_in_time_only_from_far_below(drop, avoidable):
     options = {"p3_bar": (1.0, 1.0), "drop_bar": (drop, drop), "scenario": "none"}
-    shut = Shut(open_below=-0.1, shut_above=0.0)
-    assert (highest_error(shut, 1.5, **options) < 0.5) == avoidable
+    assert (highest_error(Always(on=True), 1.5, **options) < 0.5) == avoidable
 
 
 def test_a_starved_circuit_reaches_its_band_once_refilled_and_not_before():
@@ -116,10 +90,3 @@ def test_every_effect_is_there_at_growing_sizes():
         for symbol in set(levels["top"]) - {"A_pipe"}:
             sizes = [abs(levels[level][symbol]) for level in LEVELS]
             assert 0 < sizes[0] < sizes[1] < sizes[2]
-
-
-def test_groups_and_single_scenarios_are_found_by_name():
-    assert scenario_group("beyond") == BEYOND
-    assert scenario_group("restart") == {"restart": BEYOND["restart"]}
-    with pytest.raises(ValueError, match="no scenario 'flood': give named, beyond, worn, or some of"):
-        scenario_group("flood")

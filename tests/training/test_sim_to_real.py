@@ -4,7 +4,6 @@ import json
 import math
 from typing import Any
 
-import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3")
@@ -16,7 +15,7 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from identification.commands import bench
-from training.commands.sim_to_real import MEASURED, SIMULATED, gap_table, share_picture, trained
+from training.commands.sim_to_real import MEASURED, SIMULATED, gap_table, trained
 from training.evaluation.scenarios import EVALUATION
 from training.studies.comparison import SCORES, compare
 
@@ -55,14 +54,6 @@ def test_a_late_coil_gives_larger_errors_than_simulated():
     assert (errors["low"] > 10).all()
     assert (errors["low"] < errors["difference"]).all()
     assert (errors["difference"] < errors["high"]).all()
-
-
-def test_the_picture_has_a_line_for_each_row():
-    shares = pd.DataFrame({"a": [1.0, 2.0], "b": [3.0, 4.0]}, index=["one", "two"])
-    (axes,) = share_picture(shares, {"a": ("o", "white", 7), "b": ("s", "black", 7)}).axes
-    lines: Any = axes.lines
-    assert [list(line.get_xdata()) for line in lines] == [[1.0, 2.0], [3.0, 4.0]]
-    assert [label.get_text() for label in axes.get_yticklabels()] == ["one", "two"]
 
 
 def run_loop(out, *more):
@@ -109,11 +100,6 @@ def test_what_is_finished_is_kept(finished):
     assert times() == before
 
 
-def test_another_effect_in_the_same_folder_is_refused(finished, capsys):
-    assert run_loop(finished, "--effect", "seat_leak=1e-7") == 2
-    assert "holds a sim-to-real run with effect command_delay=0.006, not" in capsys.readouterr().err
-
-
 def test_another_effect_is_refused_wherever_the_first_was_stopped(tmp_path, monkeypatch, capsys):
     record = bench.run
 
@@ -141,9 +127,3 @@ def test_deployments_belong_to_both_valves_and_the_policy(finished):
 def test_a_policy_of_another_plant_is_not_taken_up(finished):
     with pytest.raises(ValueError, match="holds a policy with plants"):
         trained(finished / "after", plant(t_delay=0.004), "exact", seed=0, timesteps=8192)
-
-
-def test_an_unknown_effect_is_refused_before_anything_is_written(tmp_path, capsys):
-    assert run_loop(tmp_path, "--effect", "gremlins=3") == 2
-    assert "unknown effect" in capsys.readouterr().err
-    assert list(tmp_path.iterdir()) == []

@@ -18,13 +18,7 @@ from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import table
 from epv_env.plant.plantfile import Plant, save_plant
 from epv_env.settings import make_settings
-from training.studies.sweep import (
-    ONE_AT_A_TIME,
-    chosen_points,
-    harmful_changes,
-    parameters,
-    regions,
-)
+from training.studies.sweep import ONE_AT_A_TIME, harmful_changes, parameters
 
 pytestmark = pytest.mark.training
 
@@ -51,12 +45,6 @@ def test_the_parameters_are_those_of_tables_6_and_7_and_the_environment():
     groups = {"partially known", "unknown", "environment"}
     named = {s for s, row in table().items() if row.group in groups}
     assert factors == named - set(CATALOGUE["local_gas_speed"])
-
-
-def test_only_named_factors_are_changed_and_regions_stay():
-    points = chosen_points(PLANT, ["regions", "parameters"], ["R"])
-    assert {point.factor for point in points} == {"region", "R"}
-    assert len(points) == len(list(regions(PLANT))) + 4
 
 
 def test_a_change_hurts_if_its_interval_lies_above_the_nominal_one():
@@ -124,17 +112,3 @@ def test_a_plant_of_other_sensors_is_swept_anew(tmp_path):
         assert len(set(finished(tmp_path / "out"))) == len(finished(tmp_path / "out")) == 4
         subjects.append((tmp_path / "out" / "finished.jsonl").read_text().splitlines()[0])
     assert subjects[0] != subjects[1]
-
-
-@pytest.mark.parametrize(
-    ("arguments", "words"),
-    [
-        (["--factors", "luck"], "no factor 'luck' in the designs"),
-        (["--scenario", "flood"], "unknown consumption scenario 'flood'"),
-        (["--device", "cuda"], "needs an NVIDIA accelerator"),
-    ],
-)
-def test_wrong_input_gets_one_sentence_and_leaves_nothing(arguments, words, tmp_path, capsys):
-    assert sweep(tmp_path / "out", *arguments) == 2
-    assert words in capsys.readouterr().err
-    assert not (tmp_path / "out").exists()

@@ -4,7 +4,6 @@ import pytest
 
 from controllers.tuned import Tuning, load_tunings, save_tunings
 from epv_env.common.commands import main_of
-from training.commands.tune import kept
 
 pytestmark = pytest.mark.training
 SHORT = ("--trials", "1", "--episodes", "1", "--duration", "0.1")
@@ -34,7 +33,3 @@ def test_another_budget_is_refused_and_the_file_left_alone(tmp_path, capsys):
     assert main("--only", "hysteresis", "--out", str(path)) == 2
     assert "search all kinds anew" in capsys.readouterr().err
     assert load_tunings(path) == {"hysteresis": OTHER}
-
-
-def test_nothing_is_kept_of_a_file_that_is_not_there(tmp_path):
-    assert kept(tmp_path / "none.json", SEARCH) == {}

@@ -30,8 +30,7 @@ from identification.calibration.search import METHODS
 from identification.pipeline.identification import Identification
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
-from identification.replay.replay import responses
-from identification.replay.response_blocks import errors_as_json
+from identification.replay.replay import errors_as_json, responses
 from identification.sensitivity import studied_symbols
 
 FOLDER = Path(__file__).parent

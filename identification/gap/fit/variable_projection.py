@@ -11,9 +11,8 @@ from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
-
-from identification.gap.runge_kutta import compiled
 
 ROUNDING = 1e-10
 """Relative excess of a bound, and slope at a bound, that is rounding [1]."""
@@ -60,7 +59,7 @@ def _pivoted(matrix, moment, low, high):
     return x
 
 
-@compiled
+@register_jitable
 def _minimise(matrix, moment, low, high, place, x):
     """Write the minimiser over the numbers between the bounds into x, by Cholesky's decomposition."""
     n = len(x)
@@ -86,7 +85,7 @@ def _minimise(matrix, moment, low, high, place, x):
         x[i] /= factor[i, i]
 
 
-@compiled
+@register_jitable
 def _slope(i, matrix, moment, x):
     """Slope of the function by number i."""
     slope = -moment[i]
@@ -95,7 +94,7 @@ def _slope(i, matrix, moment, x):
     return slope
 
 
-@compiled
+@register_jitable
 def _wanted(i, matrix, moment, low, high, place, x):
     """Where number i wants to be: -1 at its lower bound, 1 at the upper one, 0 between."""
     if high[i] <= low[i]:

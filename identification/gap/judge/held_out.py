@@ -17,7 +17,7 @@ from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import FLOOR, Gap, GapDraws, block_samples
 from identification.gap.judge.black_box import predict_residuals
 from identification.gap.plant import GreyBox
-from identification.gap.prepare.time_scale import time_scale
+from identification.gap.prepare.prepared_plant import time_scale
 
 NOMINAL, RECALIBRATED = "nominal", "recalibrated"
 """Labels of the two models without a cause."""

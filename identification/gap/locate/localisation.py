@@ -23,7 +23,7 @@ from identification.gap.locate.forcing import (
     quadratic_forms,
 )
 from identification.gap.plant import StateEquation
-from identification.gap.prepare.time_scale import time_scale
+from identification.gap.prepare.prepared_plant import time_scale
 
 FREE, SLOW = "free", "slow"
 """Processes in time: independent windows, or neighbours alike. Other processes bear a state's name."""

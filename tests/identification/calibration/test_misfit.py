@@ -1,11 +1,14 @@
-"""The misfit is eq. 21 less its nuisances, blind to what they explain, and has the right derivatives."""
+"""The misfit is eq. 21 less its nuisances, as a function of a vector of scaled parameters."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
+from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.region import CALIBRATED_SYMBOLS
 from identification.calibration.problem import (
+    ParameterVector,
     WeightedResiduals,
     measured_outputs,
     noise_weights,
@@ -79,12 +82,8 @@ def test_noise_weights_make_the_right_model_s_residuals_one():
 
 
 @pytest.mark.parametrize(("channel", "size"), [("p3", 5e3), ("I", 0.01)])
-def test_a_constant_error_of_the_p3_and_i_sensors_is_not_seen(channel, size):
+def test_a_constant_error_of_the_p3_and_i_sensors_is_not_seen_and_a_drift_is(channel, size):
     assert moved(**{channel: lambda time, values: values + size}) < 1e-9
-
-
-@pytest.mark.parametrize(("channel", "size"), [("p3", 5e3), ("I", 0.01)])
-def test_a_drift_of_them_is_seen(channel, size):
     assert moved(**{channel: lambda time, values: values + size * time}) > 0.3
 
 
@@ -106,3 +105,33 @@ def test_derivatives_are_central_differences(away):
         ends = [np.concatenate(misfit.residuals(z + way * axis)) for way in (-1, 1)]
         difference = (ends[1] - ends[0]) / 2e-5
         assert np.linalg.norm(column - difference) < 0.02 * np.linalg.norm(difference)
+
+
+START = Parameters.initial_guess()
+FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
+
+
+def test_a_set_comes_back():
+    parameters = FOUR.parameters(FOUR.scaled(TRUE))
+    for symbol in TRUE:
+        assert parameters[symbol] == pytest.approx(
+            TRUE[symbol] if symbol in FOUR.symbols else START[symbol]
+        )
+
+
+def test_bounds_are_the_ends_of_the_domains():
+    for symbol, ends in zip(FOUR.symbols, FOUR.bounds, strict=True):
+        assert tuple(ends * START[symbol]) == pytest.approx(table()[symbol].domain)
+
+
+def test_bounds_rise_for_a_negative_reference_too():
+    """a1's domain is symmetric about zero."""
+    (ends,) = ParameterVector(("a1",), TRUE.replace(a1=-0.05)).bounds
+    assert tuple(ends) == pytest.approx((-2.0, 2.0))
+
+
+@pytest.mark.parametrize(("z", "end"), [(100.0, 1), (-1.0, 0)])
+def test_a_vector_outside_is_moved_to_the_end_of_the_domain(z, end):
+    """Exactly, though 0.5 / 0.72 * 0.72 is less than 0.5."""
+    moved = FOUR.parameters(np.full(4, z))
+    assert [moved[symbol] for symbol in FOUR.symbols] == FOUR.domains[:, end].tolist()

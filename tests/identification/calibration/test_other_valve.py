@@ -5,9 +5,7 @@ from functools import cache
 from pathlib import Path
 
 import numpy as np
-import pytest
 
-from epv_env.plant.parameters import ParameterError
 from epv_env.plant.plantfile import Plant, load_plant
 from identification.bench.programmes import REPORT_SUITE, at_voltage
 from identification.bench.session import measured_campaign, run_programme
@@ -58,11 +56,6 @@ def test_its_data_sheet_does_not():
     z, covariance = estimate()
     apart = z - problem().vector.scaled(problem().vector.reference)
     assert apart @ np.linalg.solve(covariance, apart) > 100 * NINETY_NINE_PERCENT
-
-
-def test_the_report_s_limits_would_refuse_it():
-    with pytest.raises(ParameterError, match="R = 12 Ohm is outside its domain"):
-        Plant.calibrated().parameters.replace(R=plant().parameters["R"])
 
 
 def test_finished_searches_belong_to_the_whole_plant(monkeypatch):

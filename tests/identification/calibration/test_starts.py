@@ -1,4 +1,4 @@
-"""Searches from several starts: spread over the domains, kept in the journal, compared at the end."""
+"""Searches from several starts are spread, kept and compared; warnings fire where they are meant to."""
 
 from dataclasses import replace
 
@@ -8,16 +8,17 @@ import pytest
 from epv_env.common.files import Journal
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.region import CALIBRATED_SYMBOLS
+from identification.calibration import search
 from identification.calibration import search as starts
-from identification.calibration.calibrate import calibrate, calibration_warnings
-from identification.calibration.problem import ParameterVector
+from identification.calibration.calibrate import calibrate, calibration_section, calibration_warnings
+from identification.calibration.problem import ParameterVector, calibration_problem
 from identification.calibration.search import (
     METHODS,
     reached_best,
     search_from_all_starts,
     starting_points,
 )
-from tests.identification.twins import calibration, problem
+from tests.identification.twins import TRUE, calibration, freed, problem, twin
 
 START = Parameters.initial_guess()
 FOUR = ParameterVector(CALIBRATED_SYMBOLS, START)
@@ -29,13 +30,13 @@ BAD_BASIN = (1.06, 0.92, 4.2, 0.95)
 @pytest.fixture
 def calls(monkeypatch):
     """Searches that end where they start, and what was asked of them."""
-    asked = []
+    asked, done = [], calibration()
 
     def searching(method):
         def search(misfit, start):
             asked.append((method, tuple(start)))
             error = float(np.sum((start - 1.0) ** 2))
-            return replace(calibration().best(method), start=start, z=start, error=error)
+            return replace(done.best(method), start=start, z=start, error=error)
 
         return search
 
@@ -72,13 +73,6 @@ def test_a_start_in_another_basin_is_reported(tmp_path, monkeypatch):
     )
 
 
-def test_ends_agree_relative_to_the_best_and_at_zero():
-    fit = calibration().best("least squares")
-    ends = ([1.0, 0.0], [1.0009, 1e-7], [1.002, 0.0], [1.0, 0.01])
-    fits = [replace(fit, z=np.array(z), error=1.0 + i) for i, z in enumerate(ends)]
-    assert reached_best(fits).tolist() == [True, True, False, False]
-
-
 def test_finished_searches_are_not_done_again(tmp_path, calls):
     first = calibrate(problem(), journal=tmp_path / "journal", subject={"of": "a"}, starts=3)
     assert len(calls) == len(set(calls)) == 6
@@ -100,3 +94,61 @@ def test_searches_of_another_subject_are_not_used(tmp_path, calls, change):
     ends = np.array([fit.start for fit in calibrated.fits["Nelder-Mead"]])
     expected = starting_points(problem().vector, len(ends), {**usual, **change}["seed"])
     np.testing.assert_array_equal(ends, expected)
+
+
+@pytest.fixture
+def warnings(tmp_path):
+    """The warnings of a problem, calibrated from its reference."""
+
+    def sentences_of(problem):
+        return calibrate(problem, journal=tmp_path / "journal", subject={}, starts=1).warnings
+
+    return sentences_of
+
+
+def fits(**changes):
+    """The good calibration's fits, with another outcome of every method."""
+    return {
+        m: [replace(fit, **changes) for fit in searches] for m, searches in calibration().fits.items()
+    }
+
+
+def test_a_good_calibration_has_none_and_its_section_no_doubt():
+    assert calibration().warnings == []
+    assert [v.status for v in calibration_section(calibration()).verdicts] == ["good"]
+    doubted = calibration_section(replace(calibration(), warnings=["the one"]))
+    assert [v.text for v in doubted.verdicts if v.status == "doubt"] == ["the one"]
+
+
+@pytest.mark.parametrize(("symbol", "end"), [("alphaMV", 0), ("R", 1)])
+def test_either_end_of_any_domain_counts(symbol, end):
+    vector = problem().vector
+    z = calibration().best("least squares").z.copy()
+    at = vector.symbols.index(symbol)
+    z[at] = vector.bounds[at, end]
+    on_end = [
+        warning for warning in calibration_warnings(problem(), fits(z=z)) if "ends at the end" in warning
+    ]
+    assert len(on_end) == 2
+    assert all(f"of {symbol}'s domain" in warning for warning in on_end)
+    assert vector.parameters(z)[symbol] == pytest.approx(vector.domains[at, end])
+
+
+def test_a_search_that_is_cut_short_is_not_trusted(warnings, monkeypatch):
+    monkeypatch.setattr(search, "MOST_EVALUATIONS", 20)
+    sentences = warnings(problem())
+    assert any("Nelder-Mead has not converged after" in warning for warning in sentences)
+    assert not any("least squares has not converged" in warning for warning in sentences)
+
+
+def test_only_those_are_named_that_cannot_be_separated():
+    four = calibration_problem(twin(), free=freed("alphaMV", "R", "V3", "alphaPV"))
+    sentences = calibration_warnings(four, fits(z=four.vector.scaled(TRUE)))
+    (separate,) = (warning for warning in sentences if "cannot separate" in warning)
+    assert "cannot separate alphaMV, V3 (" in separate
+
+
+def test_recordings_that_the_model_cannot_explain_are_noticed(warnings):
+    sentences = warnings(calibration_problem(twin(), free=freed("alphaMV")))
+    assert any("misses the recordings by" in warning for warning in sentences)
+    assert not any("cannot separate" in warning for warning in sentences)

@@ -59,21 +59,16 @@ def test_a_wrong_constant_spoils_the_estimate():
 @pytest.mark.parametrize("method", ["least squares", "Nelder-Mead"])
 def test_with_noise_both_methods_find_table_12(method):
     assert_near_truth(problem(), calibration().best(method).z)
-
-
-def test_errors_fall_to_the_noise():
-    """Table 13 falls from Table 11's size; the residual of least squares is the noise alone."""
-    calibrated = calibration()
-    assert total_response_error(calibrated.before) > 5 * total_response_error(
-        calibrated.after["Nelder-Mead"]
+    assert (
+        total_response_error(calibration().after[method])
+        < 0.003
+        < 0.01
+        < total_response_error(calibration().before)
     )
-    assert total_response_error(calibrated.after["Nelder-Mead"]) < 0.003
-    assert calibrated.best("least squares").error == pytest.approx(1.0, abs=0.03)
-    assert dict(calibrated.parameters("least squares"))["R"] == pytest.approx(TRUE["R"], rel=3e-4)
 
 
-@pytest.mark.parametrize("symbols", [("alphaMV", "alphaPV", "R")])
-def test_fewer_parameters_can_be_fitted(symbols):
+def test_fewer_parameters_can_be_fitted():
+    symbols = ("alphaMV", "alphaPV", "R")
     moved = {symbol: 0.97 * TRUE[symbol] for symbol in symbols}
     posed = calibration_problem(twin(), start=TRUE.replace(**moved), free=freed(*symbols))
     fit = fitted(posed)

@@ -1,12 +1,15 @@
 """A drive whose catalogue has thresholds and many causes, for the search: nearly static and so fast."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
+from identification.gap.black_box_plant import BlackBoxPlant
 from identification.gap.plant import Cause, Channel, FreeParameter, NuisanceParameter, Run
+from tests.identification.gap.ode_plants import quiet_run
 
 NOISE, SAMPLES, PERIOD = 0.01, 300, 0.01
 OFF = 3.0
@@ -23,14 +26,8 @@ RANGES = {
 """Lowest, highest and nominal value, and trials, by cause."""
 
 
-class Drive:
+class Drive(BlackBoxPlant):
     """y = gain (u beyond a dead zone, limited, lagged) + drag u|u| + drift t + coupling w + zero."""
-
-    channels = (Channel(name="y", unit="1", scale=1.0, noise=NOISE),)
-    parameters = (FreeParameter(symbol="gain", unit="1", low=0.1, high=3.0, nominal=1.0),)
-    tolerances = ()
-    run_offsets = (NuisanceParameter(symbol="zero", sd=0.02, step=0.01),)
-    equations = ()
 
     def __init__(
         self, truth: Mapping[str, float], *, names: Sequence[str] = tuple(RANGES), seed: int = 0
@@ -42,36 +39,19 @@ class Drive:
             names: causes in the catalogue.
             seed: of the noise.
         """
-        self.causes = tuple(_cause(name) for name in names)
-        noise = np.random.default_rng(seed)
-        true = {symbol: np.array([value]) for symbol, value in truth.items()}
-        made = []
+        noise, runs = np.random.default_rng(seed), []
         for number, name in enumerate(("first", "second", "validation")):
-            inputs = _inputs(number)
-            y = _response(true, inputs)[:, 0] + NOISE * noise.standard_normal(SAMPLES)
-            made.append(
-                Run(
-                    name=name, held_out=name == "validation", time=PERIOD * np.arange(SAMPLES),
-                    measured=y[None], trusted=np.ones((1, SAMPLES), dtype=bool), inputs=inputs,
-                )
-            )  # fmt: skip
-        self.runs = tuple(made)
-
-    def outputs(self, values: Mapping[str, NDArray], runs: Sequence[int]) -> list[NDArray]:
-        """`GreyBox.outputs`."""
-        return [_response(values, self.runs[r].inputs)[None] for r in runs]
-
-    def states(self, values, run):
-        """`GreyBox.states`."""
-        return {}
-
-    def regimes(self, values, run):
-        """`GreyBox.regimes`."""
-        return {}
-
-    def forced(self, values, run, forcing):
-        """`GreyBox.forced`: never, without equations."""
-        raise NotImplementedError
+            run = quiet_run(PERIOD, SAMPLES, **_inputs(number))
+            y = _response(truth, run) + NOISE * noise.standard_normal((1, SAMPLES))
+            runs.append(replace(run, name=name, held_out=name == "validation", measured=y))
+        super().__init__(
+            _response,
+            channels=[Channel(name="y", unit="1", scale=1.0, noise=NOISE)],
+            runs=runs,
+            parameters=[FreeParameter(symbol="gain", unit="1", low=0.1, high=3.0, nominal=1.0)],
+            causes=[_cause(name) for name in names],
+            run_offsets=[NuisanceParameter(symbol="zero", sd=0.02, step=0.01)],
+        )
 
 
 def _cause(name: str) -> Cause:
@@ -90,17 +70,12 @@ def _inputs(number: int) -> dict[str, NDArray]:
     return {"u": u, "w": np.repeat(rng.uniform(-1.0, 1.0, 10), SAMPLES // 10)}
 
 
-def _response(values: Mapping[str, NDArray], inputs: Mapping[str, NDArray]) -> NDArray:
-    """Outputs (samples, n)."""
-    n = max((len(np.atleast_1d(value)) for value in values.values()), default=1)
-    p = {name: np.full(n, nominal) for name, (_, _, nominal, _) in RANGES.items()}
-    p |= {"gain": np.ones(n), "zero": np.zeros(n), **values}
-    u, time = inputs["u"][:, None], PERIOD * np.arange(SAMPLES)
-    moved = np.sign(u) * np.maximum(np.abs(u) - p["dead_zone"], 0.0)
-    moved = np.clip(moved, -p["limit"], p["limit"])
-    kept = np.exp(-PERIOD / np.maximum(p["lag"], 1e-9))
-    lagged = np.stack(
-        [lfilter([1.0 - k], [1.0, -k], own) for k, own in zip(kept, moved.T, strict=True)], axis=1
-    )
-    others = p["drag"] * u * np.abs(u) + np.outer(time, p["drift"]) + p["zero"]
-    return p["gain"] * lagged + others + np.outer(inputs["w"], p["coupling"])
+def _response(values: Mapping[str, float], run: Run) -> NDArray:
+    """Outputs (1, samples)."""
+    nominal = {name: value for name, (_, _, value, _) in RANGES.items()}
+    p, u = {**nominal, "gain": 1.0, "zero": 0.0, **values}, run.inputs["u"]
+    moved = np.clip(np.sign(u) * np.maximum(np.abs(u) - p["dead_zone"], 0.0), -p["limit"], p["limit"])
+    kept = np.exp(-PERIOD / max(p["lag"], 1e-9))
+    lagged = np.asarray(lfilter([1.0 - kept], [1.0, -kept], moved))
+    others = p["drag"] * u * np.abs(u) + p["drift"] * run.time + p["zero"]
+    return (p["gain"] * lagged + others + p["coupling"] * run.inputs["w"])[None]

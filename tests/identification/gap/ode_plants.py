@@ -1,5 +1,7 @@
 """Small plants of plain differential equations, with readings of zero."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from identification.gap.ode_plant import OdePlant
@@ -46,22 +48,54 @@ def decay(runs=None, **changes) -> OdePlant:
     )
 
 
-def block_rate(x, u, p):
-    return x.v, u.pull - p.k * x.s - p.friction * np.sign(x.v)
+NOISE = 2e-3
+"""Of the angle's readings [rad]."""
+
+DAMPING = 0.05
+"""Viscous drag over mass, which is known [1/s]."""
+
+SPEED_OF_SIGN = 0.05
+"""Speed over which Coulomb friction changes its sign [rad/s]."""
 
 
-def block(runs, mode="compiled", steps=1, thresholds=True) -> OdePlant:
-    """A block of 1 kg on a spring, with Coulomb friction."""
+def oscillator(runs: list[Run], mode: str, quadratic: float = 0.0, coulomb: float = 0.0) -> OdePlant:
+    """x' = v, v' = u - w0^2 x - c v - missing drag; x is read."""
+
+    def rate(x, u, p):
+        drag = DAMPING * x.v + quadratic * x.v * np.abs(x.v) + coulomb * np.tanh(x.v / SPEED_OF_SIGN)
+        return x.v, u.u - p.w0**2 * x.x - drag
+
     return OdePlant(
         runs=runs,
-        channels=[Channel(name="s", unit="m", scale=1.0, noise=1e-3)],
-        states=("s", "v"),
-        rate=block_rate,
-        readings=lambda x, u, p: (x.s,),
-        start=lambda run, p: (1.0, 0.0),
-        parameters=[free("k", 1.0)],
-        causes=[Cause(name="friction", component="block", parameters=(free("friction", 0.13),))],
-        thresholds=(lambda x, u, p: (x.v,)) if thresholds else None,
+        channels=[Channel(name="x", unit="rad", scale=1.0, noise=NOISE)],
+        states=("x", "v"),
+        rate=rate,
+        readings=lambda x, u, p: (x.x,),
+        start=lambda run, p: (p.x0, p.v0),
+        parameters=[FreeParameter(symbol="w0", unit="rad/s", low=5.0, high=7.0, nominal=5.8)],
+        causes=[],
+        run_offsets=[
+            NuisanceParameter(symbol="x0", sd=0.01, step=1e-3),
+            NuisanceParameter(symbol="v0", sd=0.05, step=5e-3),
+        ],
+        forcing_steps={"v": 1e-3},
         mode=mode,
-        steps_per_sample=steps,
+        steps_per_sample=1,
     )
+
+
+def swung(periods: int, samples: int, seed: int = 1, **drag: float) -> OdePlant:
+    """Two recordings of an oscillator driven once a second, at levels that change; one is held out.
+
+    samples: in a period of the drive. drag: what the nominal model lacks.
+    """
+    rng, runs = np.random.default_rng(seed), []
+    for name in ("first", "second"):
+        levels = np.repeat(rng.uniform(0.2, 1.0, periods // 60), 60 * samples)
+        u = levels * np.sin(2 * np.pi * np.arange(periods * samples) / samples)
+        own = quiet_run(1.0 / samples, periods * samples, u=u)
+        runs.append(replace(own, name=name, held_out=name == "second"))
+    exact = oscillator(runs, "python", **drag).outputs({}, (0, 1))
+    noisy = [y[..., 0] + NOISE * rng.standard_normal(y[..., 0].shape) for y in exact]
+    recorded = [replace(run, measured=y) for run, y in zip(runs, noisy, strict=True)]
+    return oscillator(recorded, "compiled")

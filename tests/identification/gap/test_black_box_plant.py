@@ -11,14 +11,23 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from docs.examples.tank import START, Tank, levels, readings, virtual_recordings
+from docs.examples.tank import Tank, levels, readings, virtual_recordings
+from epv_env.plant.parameters import Parameters
+from epv_env.plant.plantfile import Plant
+from epv_env.plant.simulate import energised, simulate
 from identification.gap.black_box_plant import BlackBoxPlant, FmuSimulator
 from identification.gap.diagnosis import diagnose
-from identification.gap.plant import NuisanceParameter, PlantError, Run
+from identification.gap.fit.gaps import WHOLE
+from identification.gap.plant import Channel, FreeParameter, NuisanceParameter, PlantError, Run
 from identification.gap.plant_checks import check
+from identification.gap.prepare import sensor_faults
+from identification.gap.prepare.sensor_faults import reading_faults
 from identification.gap.report.gap_json import as_json
 from identification.gap.report.page import sections
-from tests.identification.gap.tank_fmu import build_tank_fmu, can_build
+from identification.report.page import Table
+from tests.identification.gap.ode_plants import quiet_run
+from training.deploy.fmu.archive import fmu
+from training.deploy.fmu.models import P1_START, P2_START, U_START, plant_model
 
 TANK = Tank(virtual_recordings({"c": 0.021, "leak": 4e-3}))
 
@@ -88,7 +97,7 @@ def test_outputs_of_another_shape_are_named():
         check(plant)
 
 
-def test_a_plant_without_equations_is_diagnosed_and_reported():
+def test_a_plant_without_equations_is_diagnosed():
     """The leaking tank, without its equation, with unknown noise and a catalogue of two."""
     channel = replace(TANK.channels[0], noise=None)
     diagnosed = diagnose(black_box(channels=(channel,), causes=TANK.causes[:2]))
@@ -96,8 +105,27 @@ def test_a_plant_without_equations_is_diagnosed_and_reported():
     best = diagnosed.conclusion.ambiguity_set[0].hypothesis
     assert best.labels == ("leak",)
     assert diagnosed.ranking.problem.values(best.estimate)["leak"] == pytest.approx(4e-3, rel=0.15)
-    assert "f1" not in as_json(diagnosed)["where"]["equation"]
-    assert sections(diagnosed)
+
+
+def test_sensors_and_clock_are_the_places_of_the_gap_and_the_whole_recording_its_regime():
+    """No equations, states or regimes are known; the sensor lags."""
+    found = diagnose(black_box(runs=Tank(virtual_recordings({"c": 0.021, "lag": 5.0})).runs))
+    where = found.localisation
+    assert where.likeliest.equation.name == "reading h"
+    assert where.missing_term is None
+    assert sum(where.equation_probabilities.values()) + where.nothing_missing == pytest.approx(1)
+    (gap,) = where.regime_gaps
+    assert (gap.channel, gap.regime) == ("h", WHOLE)
+    assert gap.gap > 2
+    tables = [b for s in sections(found) for b in s.blocks if isinstance(b, Table)]
+    assert WHOLE.replace("_", " ") in [row[0] for each in tables for row in each.rows]
+    assert list(as_json(found)["where"]["equation"]) == ["reading h", "timing"]
+
+
+def test_recordings_shorter_than_the_longest_delay_are_examined(monkeypatch):
+    monkeypatch.setattr(sensor_faults, "DELAYS", (1, 300))
+    for fault in reading_faults(black_box(), {"c": np.array([0.02])}, [0]):
+        assert np.all(np.isfinite(fault.changes[0]))
 
 
 def test_an_fmu_without_fmpy_says_what_to_install(monkeypatch, tmp_path):
@@ -106,50 +134,38 @@ def test_an_fmu_without_fmpy_says_what_to_install(monkeypatch, tmp_path):
         FmuSimulator(tmp_path / "tank.fmu", {}, ["h"], {})
 
 
-def start_level(run: Run) -> Mapping[str, float]:
-    """Level at the beginning of a recording."""
-    return {"h_start": START}
-
-
 @pytest.fixture(scope="module")
-def tank_fmu(tmp_path_factory) -> Path:
-    """The tank as an FMU."""
+def valve_fmu(tmp_path_factory) -> Path:
+    """The valve as an FMU."""
     pytest.importorskip("fmpy", reason="FMPy is not installed")
-    if not (can_build() and shutil.which("cc")):
+    if shutil.which("cc") is None:
         pytest.skip("no C compiler for an FMU of this machine")
-    return build_tank_fmu(tmp_path_factory.mktemp("fmu"))
+    path = tmp_path_factory.mktemp("fmu") / "valve.fmu"
+    path.write_bytes(fmu(plant_model(Plant.calibrated()), "cc"))
+    return path
 
 
-@pytest.fixture(scope="module")
-def fmu(tank_fmu) -> FmuSimulator:
-    """The simulator of the tank's FMU."""
-    return FmuSimulator(tank_fmu, {"q": "q"}, ["h"], {"c": "c", "leak": "leak"}, start_level)
+def test_an_fmu_simulates_the_valve_as_the_kernel_and_what_it_refuses_is_nan(valve_fmu):
+    p, U = Parameters.calibrated(), np.repeat([0.0, 24.0, 0.0], 100)
+    run = quiet_run(1e-3, len(U), U=U)
+    plant = BlackBoxPlant(
+        FmuSimulator(valve_fmu, {"U": "U"}, ["p2"], {"R": "R"}, lambda run: {"I_start": 0.5}),
+        channels=[Channel(name="p2", unit="bar", scale=1e5, noise=1e3)],
+        runs=[run],
+        parameters=[FreeParameter(symbol="R", unit="Ohm", low=35.0, high=50.0, nominal=42.0)],
+    )
+    (found,) = plant.outputs({"R": np.array([p["R"], 50.0, 4.0])}, [0])
+    start = energised(p, p1=P1_START, p2=P2_START, U=U_START)._replace(I=0.5)
+    expected = simulate(p, initial=start, U=U, period=1e-3).state.p2
+    np.testing.assert_allclose(found[0, :, 0], expected, atol=50.0)
+    assert np.max(np.abs(found[0, :, 1] - expected)) > 500.0
+    assert np.all(np.isnan(found[..., 2]))
 
 
-def test_an_fmu_simulates_the_tank(fmu):
-    plant = black_box(fmu, causes=TANK.causes[:1], run_offsets=())
-    values = {"c": np.array([0.02, 0.025]), "leak": np.array([0.0, 4e-3])}
-    (found,) = plant.outputs(values, [0])
-    (expected,) = TANK.outputs(values, [0])
-    np.testing.assert_allclose(found, expected, atol=2e-3)  # another step, inputs between samples
-    assert np.max(np.abs(expected[..., 0] - expected[..., 1])) > 0.05
-    assert check(plant) == []
-
-
-def test_an_fmu_that_stops_gives_nan(fmu):
-    plant = black_box(fmu, causes=TANK.causes[:1], run_offsets=())
-    (found,) = plant.outputs({"leak": np.array([2.0, 0.0])}, [0])
-    assert np.all(np.isnan(found[..., 0]))
-    assert np.all(np.isfinite(found[..., 1]))
-
-
-def test_a_variable_that_the_fmu_lacks_is_named(tank_fmu):
+def test_a_variable_that_the_fmu_lacks_and_a_file_that_is_none_are_named(valve_fmu, tmp_path):
     with pytest.raises(ValueError, match="the FMU has no variable depth: take names from its modelDesc"):
-        FmuSimulator(tank_fmu, {"q": "q"}, ["depth"], {"c": "c"})
-
-
-def test_a_file_that_is_no_fmu_is_named(tank_fmu, tmp_path):
+        FmuSimulator(valve_fmu, {}, ["depth"], {"R": "R"})
     path = tmp_path / "broken.fmu"
     path.write_text("nothing")
     with pytest.raises(ValueError, match=r"broken.fmu cannot be read as an FMU: .*: export it again"):
-        FmuSimulator(path, {}, ["h"], {})
+        FmuSimulator(path, {}, ["p2"], {})

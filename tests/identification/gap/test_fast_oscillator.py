@@ -1,7 +1,5 @@
 """Where the gap of an oscillator lies that swings thousands of times in a recording."""
 
-from functools import cache
-
 import numpy as np
 
 from identification.gap.fit.evidence import evaluate
@@ -16,30 +14,26 @@ from identification.gap.locate.forcing import (
 )
 from identification.gap.locate.localisation import Localisation, locate
 from identification.gap.plant import StateTrace
-from tests.identification.gap.oscillators import swung
+from tests.identification.gap.ode_plants import swung
 
 PERIODS = 960
 """Of the drive in a recording: twelve in each of 80 windows."""
 
 
-@cache
 def located() -> Localisation:
     """Where the gap lies of an oscillator with a quadratic drag."""
-    problem, estimate = recalibrate(swung({"quadratic": 0.05}, PERIODS, samples=10))
+    problem, estimate = recalibrate(swung(PERIODS, 10, quadratic=0.05))
     residuals = evaluate(problem, [estimate])[0].residuals
     return locate(problem, estimate, residuals, seed=4)
 
 
-def test_a_missing_drag_is_found_in_the_equation_of_the_speed():
+def test_a_missing_drag_is_found_in_the_equation_of_the_speed_as_a_parabola():
     found = located()
-    assert found.equation_probabilities["f2"] > 0.99
+    assert found.equation_probabilities["dv/dt"] > 0.99
     assert found.forcings[0].explained > 0.9
-
-
-def test_quadratic_drag_has_the_shape_of_a_parabola():
-    term = located().missing_term
+    term = found.missing_term
     assert term is not None
-    assert (term.equation.name, term.state) == ("f2", "v")
+    assert (term.equation.name, term.state) == ("dv/dt", "v")
     error = (term.y + 0.05 * term.x * np.abs(term.x)) / term.sd
     assert np.sqrt(np.mean(error**2)) < 2
     assert term.explained > 0.9

@@ -8,7 +8,7 @@ import pytest
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.fit.evidence import evaluate
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
-from identification.gap.fit.gaps import RegimeGap, regime_gaps
+from identification.gap.fit.gaps import regime_gaps
 from identification.gap.fit.recalibration import recalibrate
 from identification.gap.locate.forcing import quadratic_forms, window_edges
 from identification.gap.locate.localisation import Localisation, fit_processes, locate
@@ -82,15 +82,11 @@ def test_a_forcing_is_recovered_but_for_noise_and_what_calibration_absorbs():
     assert truth @ forms[0].precision @ truth > 20 * len(truth)
 
 
-def gaps_of(problem: FittingProblem, masks: list, residuals: list, seed: int) -> list[RegimeGap]:
-    return regime_gaps(problem.plant, masks, residuals, seed, scale=0.005)
-
-
 def test_regime_gaps_are_root_mean_squares_with_intervals_that_hold_them():
     problem, estimate, residuals = recalibrated_tank(leak=LEAK)
     plant, values = problem.plant, problem.candidate(estimate)
     masks = [plant.regimes(values, r) for r in problem.all_runs]
-    found = {gap.regime: gap for gap in gaps_of(problem, masks, residuals, seed=1)}
+    found = {gap.regime: gap for gap in regime_gaps(problem.plant, masks, residuals, 1, scale=0.005)}
     assert set(found) == {"filling", "draining"}
     for regime, gap in found.items():
         own = residuals[2][0][masks[2][regime]]
@@ -101,5 +97,5 @@ def test_regime_gaps_are_root_mean_squares_with_intervals_that_hold_them():
 def test_a_regime_that_is_met_too_seldom_has_no_sure_gap():
     problem, _, residuals = recalibrated_tank()
     once = [{"once": np.arange(240) == (7 if r == 0 else -1)} for r in problem.all_runs]
-    (gap,) = gaps_of(problem, once, residuals, seed=1)
+    (gap,) = regime_gaps(problem.plant, once, residuals, 1, scale=0.005)
     assert (gap.low, gap.high, gap.held_out) == (0.0, np.inf, False)

@@ -113,13 +113,6 @@ def test_the_law_is_said_drawn_and_written():
     assert len(drawn_laws(found, best)) == 1
 
 
-def test_no_strength_is_said_to_be_negative():
-    law = Law(cause=swing([pushed(0)]).causes[0], argument="s", low=0.0, high=1.0)
-    steep = np.linalg.lstsq(COMPONENTS, np.linspace(-1.5, 1.5, KNOTS), rcond=None)[0]
-    assert law.growth(steep)[0] < -1.0
-    assert "-100% at its least value" in in_words([(law, steep)])
-
-
 def test_components_are_orthogonal_and_hold_the_prior():
     apart = np.subtract.outer(np.arange(KNOTS), np.arange(KNOTS)) / (KNOTS - 1) / LENGTH
     centred, products = np.eye(KNOTS) - 1.0 / KNOTS, COMPONENTS.T @ COMPONENTS

@@ -1,20 +1,14 @@
-"""A plant of plain differential equations obeys closed forms, compiled or not, and the protocol.
-
-A block with Coulomb friction turns and sticks as events in scipy make it.
-"""
+"""A plant of plain differential equations obeys closed forms, compiled or not, and the protocol."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-from scipy.integrate import solve_ivp
 
-from docs.examples.tank import AREA, PERIOD, START, levels
 from identification.gap.diagnosis import diagnose
 from identification.gap.fit.gaps import WHOLE
-from identification.gap.plant import Cause, Channel, GreyBox, Run, window_forcing
-from tests.identification.gap.ode_plants import block, decay, free, quiet_run
+from identification.gap.plant import Cause, GreyBox, Run, window_forcing
+from tests.identification.gap.ode_plants import decay, free, quiet_run
 
 
 def worst(plant, k: float) -> float:
@@ -92,23 +86,6 @@ def test_states_and_inputs_are_traces_and_regimes_may_be_missing():
     assert np.sum(high) == 2  # exp(-t) > 1/2 at 0 and 0.5 s
 
 
-def test_the_tank_is_that_of_the_example():
-    q = np.repeat([0.015, 0.002, 0.01], 40)
-    values = {"c": np.array([0.021, 0.025]), "leak": np.array([4e-3, 0.0])}
-    plant = decay(
-        [quiet_run(PERIOD, len(q), q=q)],
-        states=("h",),
-        rate=lambda x, u, p: (u.q / AREA - p.c * np.sqrt(x.h) - p.leak * x.h,),
-        readings=lambda x, u, p: (x.h,),
-        start=lambda run, p: (START,),
-        parameters=[free("c", 0.02)],
-        causes=[Cause(name="leak", component="tank", parameters=(free("leak", 0.0, (1e-3,)),))],
-        forcing_steps={},
-    )
-    fine = levels(values, np.repeat(q, 200), PERIOD / 200)[::200]
-    np.testing.assert_allclose(plant.outputs(values, [0])[0][0], fine, atol=2e-6)
-
-
 def noisy_runs() -> list[Run]:
     """Two recordings of a plant whose gain is 1.4."""
     rng, runs = np.random.default_rng(3), []
@@ -160,73 +137,9 @@ def test_a_wrong_description_is_refused_in_a_sentence(changes, sentence):
         decay(**changes)
 
 
-def test_without_a_stated_noise_the_readings_show_how_fine_the_steps_must_be():
-    rng = np.random.default_rng(0)
-    noisy = replace(quiet_run(0.5, 21, q=np.zeros(21)), measured=1e-3 * rng.standard_normal((1, 21)))
-    unknown = [Channel(name="y", unit="m", scale=1.0)]
-    assert decay([noisy], channels=unknown).steps_per_sample == decay([noisy]).steps_per_sample
-
-
 def test_a_function_that_numba_refuses_is_named():
     def unfit(x, u, p):
         return sorted(x, key=str)
 
     with pytest.raises(ValueError, match=r"compiled by numba \(No implementation of .* sorted"):
         decay(rate=unfit, mode="compiled")
-
-
-K, FRICTION, END = 1.0, 0.13, 15.0
-
-
-def swings(time) -> np.ndarray:
-    """Positions of the block on its spring: solve_ivp from turn to turn, then it sticks.
-
-    Between turns the motion is half a cosine about -FRICTION sign/K: it turns after pi/sqrt(K).
-    """
-    s, begin, sign, position = 1.0, 0.0, -1.0, np.empty(len(time))
-    half = np.pi / np.sqrt(K)
-    while True:
-        inside = time >= begin
-        if K * abs(s) <= FRICTION:
-            position[inside] = s
-            return position
-        found = solve_ivp(
-            lambda t, y, sign=sign: (y[1], -K * y[0] - FRICTION * sign),
-            (begin, begin + half),
-            (s, 0.0),
-            rtol=1e-11,
-            atol=1e-13,
-            dense_output=True,
-        )
-        position[inside] = found.sol(np.minimum(time[inside], begin + half))[0]
-        s, begin, sign = float(found.y[0, -1]), begin + half, -sign
-
-
-@cache
-def errors(steps: int, thresholds: bool, mode: str = "python") -> float:
-    run = quiet_run(0.1, round(END / 0.1), pull=np.zeros(round(END / 0.1)))
-    y = block([run], mode, steps, thresholds).outputs({"k": np.array([K])}, [0])[0][0, :, 0]
-    return float(np.max(np.abs(y - swings(run.time))))
-
-
-def test_turns_and_sticking_converge_to_those_of_scipy():
-    coarse, fine = errors(1, True), errors(2, True)
-    assert coarse < 5e-6
-    assert coarse / fine == pytest.approx(16, rel=0.2)
-    assert errors(1, False) > 100 * coarse
-
-
-def test_compiled_functions_locate_the_same_thresholds():
-    assert errors(1, True, "compiled") == pytest.approx(errors(1, True), rel=1e-3, abs=1e-9)
-
-
-def test_a_pulled_block_sticks_and_slips():
-    time = 0.1 * np.arange(100)
-    pull = np.where(time < 3.0, 1.0 + 0.9 * FRICTION, 1.0 + 2.0 * FRICTION)
-    position = block([quiet_run(0.1, 100, pull=pull)], "python").outputs({"k": np.array([K])}, [0])[0][
-        0, :, 0
-    ]
-    np.testing.assert_allclose(position[time <= 3.0], 1.0, atol=1e-6)
-    since = np.clip(time[30:] - time[30], 0.0, np.pi)
-    slip = 1.0 + FRICTION * (1.0 - np.cos(since))  # equilibrium 1 + friction, turns after half a period
-    np.testing.assert_allclose(position[30:], slip, atol=1e-5)

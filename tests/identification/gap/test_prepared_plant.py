@@ -47,12 +47,6 @@ def noisy(samples: int, period: float, seed: int = 0) -> NDArray:
     return np.sin(2 * np.pi * np.arange(samples) / period) + SIGMA * noise
 
 
-@pytest.mark.parametrize(("samples", "period", "accuracy"), [(80, 30.0, 0.25), (55_000, 900.0, 0.03)])
-def test_noise_is_seen_beside_motion(samples, period, accuracy):
-    plant = recorded(*(noisy(samples, period, seed) for seed in range(3)))
-    assert plant.channels[0].noise == pytest.approx(SIGMA, rel=accuracy)
-
-
 def test_neighbours_of_a_slow_channel_are_its_trusted_readings():
     readings, trusted = np.full(10_000, np.nan), np.zeros(10_000, bool)
     trusted[::10] = True
@@ -99,11 +93,6 @@ def test_untrusted_readings_that_are_no_number_count_nothing():
         residual = problem.residual(0, outputs.reshape(-1, 1))
         np.testing.assert_array_equal(residual[10:20], 0.0)
         assert np.all(np.abs(residual) < 200)
-
-
-def test_residuals_are_not_weighed_by_a_noise_that_nobody_knows():
-    with pytest.raises(ValueError, match=r"channel h: its noise is None.*call prepared\(plant\)"):
-        FittingProblem(tank())
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from identification.gap.prepare.screened import Finding, screen
 from identification.gap.report.gap_json import as_json
 from identification.gap.report.sentences import verdict_sentence
 from tests.identification.gap.drives import Drive
-from tests.identification.gap.oscillators import swung
+from tests.identification.gap.ode_plants import swung
 from tests.identification.gap.tanks import diagnosed
 
 LEAKING = {"c": 0.021, "leak": 4e-3}
@@ -127,7 +127,7 @@ CLEAN = {
     "encoder": lambda: [np.round(np.sin(np.arange(900) / 200.0) / 0.05) * 0.05] * 2,
     "held": lambda: [np.repeat(own, 10) for own in tank()],
     "drive": lambda: [run.measured[0] for run in Drive({"dead_zone": 0.3, "limit": 0.7}).runs],
-    "oscillator": lambda: [run.measured[0] for run in swung({"coulomb": 0.2}, 120, 6).runs],
+    "oscillator": lambda: [run.measured[0] for run in swung(120, 6, coulomb=0.2).runs],
 }
 
 

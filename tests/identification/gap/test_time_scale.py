@@ -9,7 +9,7 @@ import pytest
 from scipy.signal import lfilter
 
 from identification.gap.plant import Channel, Run
-from identification.gap.prepare.time_scale import time_scale
+from identification.gap.prepare.prepared_plant import time_scale
 from identification.valve_gap.valve import TIME_SCALE
 
 
@@ -70,14 +70,6 @@ def test_it_is_the_time_constant_or_a_fifth_of_the_period(name, noise):
     readings = course.values + noise * np.random.default_rng(1).standard_normal(len(course.values))
     found = time_scale(recorded(readings, period=course.period, noise=max(noise, 1e-4)))
     assert course.scale / 3 < found < 3 * course.scale
-
-
-@pytest.mark.parametrize("factor", [0.3, 3.0])
-def test_a_wrong_noise_hardly_moves_it(factor):
-    course = COURSES["pendulum at 100 Hz"]
-    readings = course.values + 0.2 * np.random.default_rng(1).standard_normal(len(course.values))
-    found = time_scale(recorded(readings, period=course.period, noise=0.2 * factor))
-    assert course.scale / 2 < found < 2 * course.scale
 
 
 def test_a_channel_read_at_every_tenth_sample_has_the_same_time_scale():

@@ -9,16 +9,17 @@ import numpy as np
 import pandas as pd
 
 from identification.importing.import_campaign import LARGEST_FILE
-from identification.importing.source_file import LONGEST_NAME, MOST_CHANNELS
+from identification.importing.source_file import MOST_CHANNELS
 from identification.recordings.recording import Recording
-from tests.identification.importing.dialects import columns_of, text
-from tests.identification.importing.timed_files import channels_of, frame, mat5
+from tests.identification.importing.dialects import columns_of, mat5, named, text
+from tests.identification.importing.timed_files import channels_of, frame
 
 
 def rows(
     at: Path, true: Recording, head: list[str], *, sep: str = ";", end: str = "", last: str = ""
 ) -> Path:
     """Lines of a head, then of numbers that end as told, then a last one."""
+    at = at if at.suffix else at.with_suffix(".csv")
     values = np.transpose([values for values, _ in columns_of(true).values()])
     lines = [sep.join(f"{value:.9f}" for value in row) + end for row in values]
     at.write_text("\n".join([*head, *lines, last]))
@@ -84,8 +85,8 @@ def struct_array(true: Recording) -> dict[str, Any]:
 
 
 def interval(true: Recording) -> dict[str, Any]:
-    named = {f"{name}_{unit}": values for name, (values, unit) in channels_of(true).items()}
-    return {"Tstart": -0.02, "Tinterval": true.period, "Length": float(len(true)), **named}
+    length = {"Tstart": -0.02, "Tinterval": true.period, "Length": float(len(true))}
+    return length | named(channels_of(true))
 
 
 def written(at: Path, content: str) -> Path:
@@ -124,7 +125,7 @@ def multi(at: Path, true: Recording, begin: str = "Time" + 5 * "\t10:00:00.0") -
 
 def words(at: Path, true: Recording) -> Path:
     """Some cells hold a word for a missing reading, and some rows a decimal comma among points."""
-    lines = rows(at.with_suffix(".csv"), true, [BRACKETED]).read_text().splitlines()
+    lines = rows(at, true, [BRACKETED]).read_text().splitlines()
     for k, word in enumerate(["NaN", "NULL", "#NV", "---", "Inf", ""]):
         cells = lines[20 + 40 * k].split(";")
         lines[20 + 40 * k] = ";".join([*cells[:3], word, *cells[4:]])  # p1, which is steady
@@ -166,18 +167,13 @@ def nanoseconds(at: Path, true: Recording) -> Path:
 READ: dict[str, Callable[[Path, Recording], Path]] = {
     "LabVIEW text with a column of comments": lvm,
     "names, types and units in three rows": three_header_rows,
-    "a separator at the ends of the data": lambda at, r: rows(
-        at.with_suffix(".csv"), r, [BRACKETED], end=";"
-    ),
-    "a separator at the end of the header": lambda at, r: rows(
-        at.with_suffix(".csv"), r, [BRACKETED + ";"]
-    ),
+    "a separator at the ends of the data": lambda at, r: rows(at, r, [BRACKETED], end=";"),
+    "a separator at the end of the header": lambda at, r: rows(at, r, [BRACKETED + ";"]),
     "units in brackets twice": lambda at, r: rows(
-        at.with_suffix(".csv"), r, [BRACKETED.replace("bar", "bar[a]").replace("bar[a]", "bar(a)", 1)]
+        at, r, [BRACKETED.replace("bar", "bar[a]").replace("bar[a]", "bar(a)", 1)]
     ),
     "units of gauge pressure with a dot": lambda at, r: text(
-        at.with_suffix(".csv"),
-        {n: (v - 1.0, "bar rel.") if u == "bar" else (v, u) for n, (v, u) in columns_of(r).items()},
+        at, {n: (v - 1.0, "bar rel.") if u == "bar" else (v, u) for n, (v, u) in columns_of(r).items()}
     ),
     "TDMS without an offset": lambda at, r: waveforms(at, r, wf_increment=r.period),
     "TDMS in ms": lambda at, r: waveforms(
@@ -197,7 +193,7 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
     "times of day past midnight": lambda at, r: timed(at, r, clock(r, "%H:%M:%S.%f"), sep="\t"),
     "words for missing readings": words,
     "five header rows": lambda at, r: rows(
-        at.with_suffix(".csv"),
+        at,
         r,
         [
             "Trace;;;;;",
@@ -269,53 +265,38 @@ def table(at: Path, names: list[str]) -> Path:
     return at.with_suffix(".csv")
 
 
+def numbered(count: int) -> list[str]:
+    return [str(i) for i in range(count)]
+
+
+TEXTS, ENDLESS = np.array(["text"], dtype=object), "a" + 10_000 * " " + "b"
+
+
+def begun_apart(at: Path, true: Recording) -> Path:
+    return multi(at, true, "Time\t10:00:00.0\t10:00:00.5")
+
+
 def folder(at: Path) -> Path:
     at.mkdir()
     return at
 
 
 def coarse(at: Path, true: Recording) -> Path:
-    return text(at.with_suffix(".csv"), {**columns_of(true), "time": (np.round(true.time, 3), "s")})
+    return text(at, {**columns_of(true), "time": (np.round(true.time, 3), "s")})
 
 
+CUT = r"line \d+ has not the 6 numbers of the lines above: delete it"
 REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
-    "a cut last line": (
-        lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="0.65;0.44;18.9"),
-        r"line \d+ has not the 6 numbers of the lines above: delete it",
-    ),
-    "text below the numbers": (
-        lambda at, r: rows(at.with_suffix(".csv"), r, [BRACKETED], last="\nstopped by operator\n"),
-        r"line \d+ has not the 6 numbers of the lines above: delete it",
-    ),
-    "a record that begins again": (
-        restarted,
-        "time does not increase after .*: cut the recording there",
-    ),
+    "a cut last line": (lambda at, r: rows(at, r, [BRACKETED], last="0.65;0.44;18.9"), CUT),
+    "text below the numbers": (lambda at, r: rows(at, r, [BRACKETED], last="\nstopped by hand\n"), CUT),
+    "a record that begins again": (restarted, "time does not increase after .*: cut the recording"),
     "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
-    "a text called MDF": (
-        lambda at, r: written(at.with_suffix(".mf4"), "a text"),
-        "it does not begin as MDF does",
-    ),
+    "a text called MDF": (lambda at, r: written(at.with_suffix(".mf4"), "a"), "not begin as MDF does"),
     "a folder": (lambda at, r: folder(at), "is a folder: give the path of a measurement file"),
     "a file above the limit": (lambda at, r: huge(at), "is larger than .* bytes"),
-    "very many columns": (
-        lambda at, r: table(at, [str(i) for i in range(MOST_CHANNELS + 1)]),
-        f"more than {MOST_CHANNELS} channels",
-    ),
-    "lines without end": (
-        lambda at, r: table(at, [str(i) for i in range(100_000)]),
-        "has lines of more",
-    ),
-    "a name without end": (
-        lambda at, r: table(at, ["time", "a" + " " * 10_000 + "b"]),
-        f"more than {LONGEST_NAME} characters: shorten it",
-    ),
-    "LabVIEW's channels that begin apart": (
-        lambda at, r: multi(at, r, "Time\t10:00:00.0\t10:00:00.5"),
-        "begin at different times of day",
-    ),
-    "a MATLAB file of texts": (
-        lambda at, r: mat5(at, {"a": np.array(["text"], dtype=object)}),
-        "no series of numbers in it",
-    ),
+    "very many columns": (lambda at, r: table(at, numbered(MOST_CHANNELS + 1)), "more than .* channels"),
+    "lines without end": (lambda at, r: table(at, numbered(100_000)), "has lines of more"),
+    "a name without end": (lambda at, r: table(at, ["time", ENDLESS]), "more than .* characters"),
+    "LabVIEW's channels that begin apart": (begun_apart, "begin at different times of day"),
+    "a MATLAB file of texts": (lambda at, r: mat5(at, {"a": TEXTS}), "no series of numbers in it"),
 }

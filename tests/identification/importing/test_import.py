@@ -6,33 +6,28 @@ import sys
 import numpy as np
 import pytest
 
-from epv_env.plant.parameters import Parameters
 from identification.__main__ import main
-from identification.bench.programmes import REPORT_SUITE
-from identification.bench.session import run_bench
 from identification.importing.common_grid import resampled
 from identification.importing.source_file import ImportingError
 from identification.importing.units import parsed_unit
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CampaignError
-from tests.identification.importing.dialects import DIALECTS, columns_of, text
-from tests.identification.importing.round_trip import assert_same_recordings, import_campaign
+from tests.identification.importing.dialects import (
+    DIALECTS,
+    assert_same_recordings,
+    bench,
+    columns_of,
+    import_campaign,
+    text,
+)
+from tests.identification.importing.timed_files import SAME_RATE
 
-SUITE = (REPORT_SUITE[0], REPORT_SUITE[-2], REPORT_SUITE[-1])
 
-
-@pytest.fixture(scope="module")
-def bench():
-    """A test, the validation and the record at rest of the virtual bench."""
-    return run_bench(SUITE, Parameters.calibrated(), seed=11)
-
-
-@pytest.mark.parametrize("dialect", DIALECTS)
-def test_every_dialect_gives_the_same_campaign(bench, dialect, tmp_path):
-    files = [DIALECTS[dialect](tmp_path / r.name, r) for r in bench.recordings]
+@pytest.mark.parametrize("write", [*DIALECTS.values(), *SAME_RATE.values()], ids=[*DIALECTS, *SAME_RATE])
+def test_every_dialect_and_kind_of_time_gives_the_same_campaign(write, tmp_path):
+    files = [write(tmp_path / r.name, r) for r in bench().recordings]
     import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
-    campaign = read_campaign(tmp_path / "campaign")
-    assert_same_recordings(campaign, bench)
+    assert_same_recordings(read_campaign(tmp_path / "campaign"), bench())
 
 
 def test_resampling_neither_delays_nor_folds():
@@ -52,24 +47,8 @@ def test_resampling_neither_delays_nor_folds():
     assert np.max(np.abs(late - true)[inside]) > 0.01
 
 
-def test_channels_of_other_rates_and_jitter_come_to_one_grid(bench, tmp_path):
-    """The current at 2 kHz, jittering pressures; no current sample moves, no pressure is delayed."""
-    recording = bench.recordings[0]
-    rng = np.random.default_rng(1)
-    columns = columns_of(recording)
-    jitter = recording.time + rng.uniform(-1e-4, 1e-4, len(recording))
-    columns["time"] = (jitter, "s")
-    path = text(tmp_path / "test1.csv", columns)
-    campaign = import_campaign([path], tmp_path / "out", rate=1000.0, ambient_bar=1.0).campaign
-    made = campaign.recordings[0]
-    assert made.period == 1e-3
-    assert json.loads((tmp_path / "out/campaign.json").read_text())["provenance"]["files"][0][
-        "channels"
-    ]["p1"]["resampled"]
-
-
-def test_a_dry_run_shows_everything_and_writes_nothing(bench, tmp_path, capsys):
-    path = text(tmp_path / "test1.csv", columns_of(bench.recordings[0]))
+def test_a_dry_run_shows_everything_and_writes_nothing(tmp_path, capsys):
+    path = text(tmp_path / "test1.csv", columns_of(bench().recordings[0]))
     assert main(["import", str(path), "--out", str(tmp_path / "out"), "--dry-run"]) == 0
     shown = capsys.readouterr().out
     assert "2000 Hz" in shown
@@ -77,8 +56,8 @@ def test_a_dry_run_shows_everything_and_writes_nothing(bench, tmp_path, capsys):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["test1.csv"]
 
 
-def test_a_mapping_file_names_the_rest(bench, tmp_path):
-    columns = {f"K{i}": pair for i, pair in enumerate(columns_of(bench.recordings[0]).values())}
+def test_a_mapping_file_names_the_rest(tmp_path):
+    columns = {f"K{i}": pair for i, pair in enumerate(columns_of(bench().recordings[0]).values())}
     path = text(tmp_path / "a.csv", columns, bracket=False)
     units = ("s", "A", "V", "bar abs", "bar abs", "bar abs")
     names = ("time", "I", "U", "p1", "p2", "p3")
@@ -127,8 +106,8 @@ def test_what_is_no_unit_is_none_and_found_so_at_once(text):
     assert parsed_unit(text) is None
 
 
-def test_wrong_inputs_are_refused_and_nothing_written(bench, tmp_path):
-    good = columns_of(bench.recordings[0])
+def test_wrong_inputs_are_refused_and_nothing_written(tmp_path):
+    good = columns_of(bench().recordings[0])
     gauge = {n: (v, f"{u} gauge" if u == "bar" else u) for n, (v, u) in good.items()}
     with pytest.raises(ImportingError, match="is gauge pressure: give the environment"):
         import_campaign([text(tmp_path / "a.csv", gauge)], tmp_path / "out")

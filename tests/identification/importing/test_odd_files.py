@@ -2,20 +2,14 @@
 
 import json
 import re
-from typing import Any
 
 import numpy as np
 import pytest
-import scipy.io
 
-from epv_env.plant.parameters import Parameters
-from identification.bench.programmes import REPORT_SUITE
-from identification.bench.session import run_bench
-from identification.importing.binary_files import ALL_INVALID
 from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
-from tests.identification.importing.dialects import columns_of, text
+from tests.identification.importing.dialects import bench, columns_of, mat5, tdms, text
 from tests.identification.importing.odd_files import (
     NAMES,
     READ,
@@ -27,13 +21,12 @@ from tests.identification.importing.odd_files import (
     nulls,
     texts,
 )
-from tests.identification.importing.timed_files import mat5
 
 
 @pytest.fixture(scope="module")
 def true():
     """The validation recording of the virtual bench."""
-    return run_bench((REPORT_SUITE[-2],), Parameters.calibrated(), seed=13).recordings[0]
+    return bench().recordings[1]
 
 
 @pytest.mark.parametrize("kind", READ)
@@ -79,24 +72,12 @@ def test_a_file_that_was_cut_within_its_last_cell_loses_that_line(true, tmp_path
 
 
 def test_all_names_of_two_groups_are_in_one_mapping(true, tmp_path):
-    from nptdms import ChannelObject, TdmsWriter
-
-    with TdmsWriter(tmp_path / "run.tdms") as writer:
-        for group in ("first", "second"):
-            for name, (values, unit) in columns_of(true).items():
-                given = {"unit_string": unit}
-                writer.write_segment([ChannelObject(group, name, values, properties=given)])
+    path = tdms(tmp_path / "run", columns_of(true), first={}, second={})
     with pytest.raises(ImportingError, match="p2 may be 'first/p2' or 'second/p2'") as error:
-        read_files([tmp_path / "run.tdms"], ambient_bar=1.0)
-    (tmp_path / "map.json").write_text(str(error.value).partition(" such as ")[2])
-    made = read_files([tmp_path / "run.tdms"], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign
-    np.testing.assert_allclose(made.recordings[0].p2, true.p2, rtol=0, atol=1e-6)
-
-
-def test_a_matrix_without_names_needs_its_times_in_the_mapping(true, tmp_path):
-    path = mat5(tmp_path / "run", {"ans": [values for values, _ in columns_of(true).values()]})
-    with pytest.raises(ImportingError, match=r'"time": \{"source": "NAME", "unit": "s"\}'):
         read_files([path], ambient_bar=1.0)
+    (tmp_path / "map.json").write_text(str(error.value).partition(" such as ")[2])
+    made = read_files([path], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign
+    np.testing.assert_allclose(made.recordings[0].p2, true.p2, rtol=0, atol=1e-6)
 
 
 def test_one_name_in_two_groups_is_chosen_by_its_group(true, tmp_path):
@@ -107,28 +88,6 @@ def test_one_name_in_two_groups_is_chosen_by_its_group(true, tmp_path):
         mapping = MappingFile(channels={"p2": ChannelEntry(source=f"group {group}/p2")})
         made = read_files([path], mapping=mapping, ambient_bar=1.0).campaign.recordings[0]
         assert made.period == period
-
-
-def test_what_holds_no_numbers_does_not_stand_in_the_way(true, tmp_path):
-    from asammdf import MDF, Signal
-
-    path = mdf_groups(tmp_path / "run", true)
-    with MDF(path) as file:
-        file.append([Signal(samples=np.empty(0), timestamps=np.empty(0), name="p2", unit="bar")])
-        file.append([Signal(samples=true.p2, timestamps=true.time, name="p3", unit="bar")])
-        channels: Any = file.groups[-1].channels
-        channels[-1].flags |= ALL_INVALID
-        file.save(path.with_stem("run2"), overwrite=True)
-    path = path.with_stem("run2")
-    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
-
-
-def test_a_matlab_function_stands_in_the_list_and_not_in_the_way(true, tmp_path, monkeypatch):
-    function = scipy.io.matlab.MatlabFunction(np.empty(0, dtype=object))
-    path = mat5(tmp_path / "run", {})
-    monkeypatch.setattr(scipy.io, "loadmat", lambda *_, **__: {**interval(true), "f": function})
-    assert any("f (a MATLAB object" in channel.name for channel in read_source(path).channels)
-    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
 
 
 def test_units_alone_are_a_mapping_and_the_error_shows_it(true, tmp_path):

@@ -5,49 +5,31 @@ import json
 import numpy as np
 import pytest
 
-from epv_env.plant.parameters import Parameters
-from identification.bench.programmes import REPORT_SUITE
-from identification.bench.session import run_bench
 from identification.importing.import_campaign import import_text, read_files
+from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
 from identification.importing.times import points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
 from identification.recordings.recording import CHANNELS
-from tests.identification.importing.dialects import columns_of, text
-from tests.identification.importing.round_trip import assert_same_recordings, import_campaign
-from tests.identification.importing.timed_files import (
-    LEAD,
-    SAME_RATE,
-    TWO_RATES,
-    channels_of,
-    mat5,
-    structs,
-    tdms,
-)
+from tests.identification.importing.dialects import bench, columns_of, import_campaign, mat5, text
+from tests.identification.importing.dialects import tdms as in_groups
+from tests.identification.importing.timed_files import LEAD, TWO_RATES, channels_of, structs, tdms
 
 
 @pytest.fixture(scope="module")
-def bench():
-    """The validation and the record at rest of the virtual bench."""
-    return run_bench((REPORT_SUITE[-2], REPORT_SUITE[-1]), Parameters.calibrated(), seed=12)
-
-
-@pytest.mark.parametrize("kind", SAME_RATE)
-def test_every_kind_of_time_gives_the_campaign_back(bench, kind, tmp_path):
-    files = [SAME_RATE[kind](tmp_path / r.name, r) for r in bench.recordings]
-    import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
-    assert_same_recordings(read_campaign(tmp_path / "campaign"), bench)
+def true():
+    """The validation recording of the virtual bench."""
+    return bench().recordings[1]
 
 
 @pytest.mark.parametrize("kind", TWO_RATES)
-def test_channels_of_two_rates_come_to_the_slower_one(bench, kind, tmp_path):
-    files = [TWO_RATES[kind](tmp_path / r.name, r) for r in bench.recordings]
+def test_channels_of_two_rates_come_to_the_slower_one(kind, tmp_path):
+    files = [TWO_RATES[kind](tmp_path / r.name, r) for r in bench().recordings]
     imported = import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
     assert imported.files[0].gridded.resampled == ("I",)
     assert imported.files[0].gridded.held == ("U",)
-    for made, true in zip(
-        read_campaign(tmp_path / "campaign").recordings, bench.recordings, strict=True
-    ):
+    campaign = read_campaign(tmp_path / "campaign")
+    for made, true in zip(campaign.recordings, bench().recordings, strict=True):
         assert made.period == 2 * true.period
         for name in ("U", "p1", "p2", "p3"):
             atol = 1e-5 if name == "U" else 1.0
@@ -62,8 +44,7 @@ def jittering(path, true, size):
 
 
 @pytest.mark.parametrize("size", [5e-7, 4e-6])
-def test_times_within_rounding_of_the_grid_leave_every_value_as_it_is(bench, size, tmp_path):
-    true = bench.recordings[0]
+def test_times_within_rounding_of_the_grid_leave_every_value_as_it_is(true, size, tmp_path):
     made, plain = (jittering(tmp_path / "a.csv", true, each) for each in (size, 0.0))
     assert made.files[0].gridded.resampled == made.files[0].gridded.held == ()
     assert made.campaign.recordings[0].period == true.period
@@ -72,8 +53,8 @@ def test_times_within_rounding_of_the_grid_leave_every_value_as_it_is(bench, siz
         np.testing.assert_array_equal(made.campaign.recordings[0].channel(name), same)
 
 
-def test_a_voltage_at_jittering_times_is_held_and_the_rest_said_to_be_filtered(bench, tmp_path):
-    made = jittering(tmp_path / "a.csv", bench.recordings[0], 1e-4)
+def test_a_voltage_at_jittering_times_is_held_and_the_rest_said_to_be_filtered(true, tmp_path):
+    made = jittering(tmp_path / "a.csv", true, 1e-4)
     U = made.campaign.recordings[0].U
     assert np.all(np.isin(U, made.files[0].channels[1].values))  # no value between or beyond
     shown = import_text(made)
@@ -81,8 +62,7 @@ def test_a_voltage_at_jittering_times_is_held_and_the_rest_said_to_be_filtered(b
     assert "U: other times than the file's, each sample is the last entry before it" in shown
 
 
-def test_a_command_logged_on_change_holds_from_one_entry_to_the_next(bench, tmp_path):
-    true = bench.recordings[0]
+def test_a_command_logged_on_change_holds_from_one_entry_to_the_next(true, tmp_path):
     U = np.where(true.energised, 24.0, 0.0)
     kept = np.concatenate([[True], np.diff(U) != 0.0])
     assert np.count_nonzero(kept) > 2
@@ -95,8 +75,7 @@ def test_a_command_logged_on_change_holds_from_one_entry_to_the_next(bench, tmp_
 
 
 @pytest.mark.parametrize("waveform", [False, True])
-def test_channels_that_start_apart_stay_in_step(bench, waveform, tmp_path):
-    true = bench.recordings[0]
+def test_channels_that_start_apart_stay_in_step(true, waveform, tmp_path):
     path = tdms(tmp_path / true.name, true, waveform=waveform, lead=LEAD)
     made = read_files([path], ambient_bar=1.0).campaign.recordings[0]
     for name in CHANNELS:
@@ -104,8 +83,7 @@ def test_channels_that_start_apart_stay_in_step(bench, waveform, tmp_path):
         np.testing.assert_allclose(made.channel(name), true.channel(name)[LEAD:], rtol=0, atol=atol)
 
 
-def test_a_mapping_file_names_each_channels_times(bench, tmp_path):
-    true = bench.recordings[0]
+def test_a_mapping_file_names_each_channels_times(true, tmp_path):
     columns = {
         "time": (true.time, "s"),
         **channels_of(true),
@@ -127,8 +105,7 @@ def test_a_mapping_file_names_each_channels_times(bench, tmp_path):
     np.testing.assert_allclose(made.I, true.I[LEAD:], rtol=0, atol=1e-5)
 
 
-def test_a_mapping_file_gives_the_unit_of_times_in_structs(bench, tmp_path):
-    true = bench.recordings[0]
+def test_a_mapping_file_gives_the_unit_of_times_in_structs(true, tmp_path):
     content = {name: {**one, "time": one["time"] * 1e3} for name, one in structs(true).items()}
     path = mat5(tmp_path / "validation", content)
     with pytest.raises(ImportingError, match=r"give the right unit of time in a mapping file"):
@@ -154,19 +131,11 @@ def test_points_in_time_are_read_to_the_nanosecond_and_zones_are_taken_off():
             points_in_time("a", ["2026-03-01T12:00", wrong])
 
 
-def test_channels_with_and_without_a_known_begin_are_not_put_side_by_side(bench, tmp_path):
-    from nptdms import ChannelObject, TdmsWriter
-
-    true = bench.recordings[0]
-    with TdmsWriter(tmp_path / "a.tdms") as writer:
-        for name, (values, unit) in channels_of(true).items():
-            start = {"wf_start_time": np.datetime64("2026-03-01T12:00:00", "us")} if name == "I" else {}
-            properties = {
-                "unit_string": unit,
-                "wf_increment": true.period,
-                "wf_start_offset": 0.0,
-                **start,
-            }
-            writer.write_segment([ChannelObject("bench", name, values, properties=properties)])
+def test_channels_with_and_without_a_known_begin_are_not_put_side_by_side(true, tmp_path):
+    waveform = {"wf_increment": true.period, "wf_start_offset": 0.0}
+    begun = {**waveform, "wf_start_time": np.datetime64("2026-03-01T12:00:00", "us")}
+    path = in_groups(tmp_path / "a", channels_of(true), first=waveform, second=begun)
+    channels = {name: ChannelEntry(source=f"first/{name}") for name in channels_of(true)}
+    mapping = MappingFile(channels=channels | {"I": ChannelEntry(source="second/I")})
     with pytest.raises(ImportingError, match="export all with the same kind of time"):
-        read_files([tmp_path / "a.tdms"])
+        read_files([path], mapping=mapping)

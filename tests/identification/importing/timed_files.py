@@ -1,16 +1,15 @@
 """One recording with times as tools write them: per channel, as points in time, at two rates."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
-import scipy.io
 from numpy.typing import NDArray
 
 from identification.recordings.recording import Recording
-from tests.identification.importing.dialects import Columns, columns_of
+from tests.identification.importing.dialects import Columns, columns_of, mat5, mat73, named
 
 NOON = np.datetime64("2026-03-01T12:00:00", "ns")
 """Point in time of a recording's first sample."""
@@ -44,48 +43,13 @@ def structs(recording: Recording, every: int = 1, ms: bool = False) -> dict[str,
 
 def time_beside(recording: Recording) -> dict[str, Any]:
     """A time vector beside the struct that holds the channels."""
-    named = {f"{name}_{unit}": values for name, (values, unit) in channels_of(recording).items()}
-    return {"t": recording.time, "data": named}
-
-
-def mat5(path: Path, content: Mapping[str, Any]) -> Path:
-    path = path.with_suffix(".mat")
-    scipy.io.savemat(path, dict(content))
-    return path
-
-
-def mat73(path: Path, content: Mapping[str, Any]) -> Path:
-    """HDF5 as MATLAB writes it: structs are groups, texts are codes of their characters."""
-    import h5py
-
-    path = path.with_suffix(".mat")
-    with h5py.File(path, "w", userblock_size=512) as file:
-        _put(file, content)
-    with path.open("r+b") as stream:
-        stream.write(b"MATLAB 7.3 MAT-file".ljust(124) + b"\x00\x02IM")
-    return path
-
-
-def _put(group: Any, content: Mapping[str, Any]) -> None:
-    for name, value in content.items():
-        if isinstance(value, Mapping):
-            member = group.create_group(name)
-            _put(member, value)
-            kind = "struct"
-        elif isinstance(value, str):
-            member = group.create_dataset(name, data=np.array([[ord(c)] for c in value], np.uint16))
-            member.attrs["MATLAB_int_decode"] = np.int32(2)
-            kind = "char"
-        else:
-            member = group.create_dataset(name, data=value[None, :])
-            kind = "double"
-        member.attrs["MATLAB_class"] = np.bytes_(kind)
+    return {"t": recording.time, "data": named(channels_of(recording))}
 
 
 def frame(recording: Recording, time: Any) -> pd.DataFrame:
     """A table with units in its names."""
-    named = {f"{n} [{u}]": values for n, (values, u) in channels_of(recording).items()}
-    return pd.DataFrame({"time": time, **named})
+    values = {f"{n} [{u}]": own for n, (own, u) in channels_of(recording).items()}
+    return pd.DataFrame({"time": time, **values})
 
 
 def csv(path: Path, table: pd.DataFrame) -> Path:

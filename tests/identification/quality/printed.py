@@ -3,9 +3,6 @@
 from docs.studies.reproduction.one_at_a_time import PRINTED
 from identification.quality.channel import DescriptiveStatistics
 
-SAMPLES = 10_000
-"""Of the report's record: 5 s at 2000 Hz."""
-
 TREND_SLOPES, TREND_OFFSETS = PRINTED["table2"]["slope"], PRINTED["table2"]["offset"]
 """Table 2 [unit/s], [unit]."""
 

@@ -71,10 +71,7 @@ def test_any_rate_comes_back(tmp_path, rate):
     assert_close(recordings, recording)
 
 
-@pytest.mark.parametrize(
-    ("rate", "decimals"),
-    [(500, 3), (2000, 4), (3000, 4), (2048, 4), (20000, 5)],
-)
+@pytest.mark.parametrize(("rate", "decimals"), [(500, 3), (2000, 4), (3000, 4), (2048, 4), (20000, 5)])
 @pytest.mark.parametrize("samples", [100, 20000])
 def test_rates_are_read_off_times_with_few_decimals(rate, decimals, samples):
     time = np.round(np.arange(samples) / rate, decimals)

@@ -57,7 +57,7 @@ def expected(name):
     return np.sqrt(sensor.noise**2 + sensor.resolution**2 / 12) * UNITS[name][1]
 
 
-def held_recording(seed, held, drift=0.0, noisy=1.0):
+def held_recording(seed, held, drift):
     """Energised for some samples, then off for as many, with other pressures and currents."""
     rng = np.random.default_rng(seed)
     after = np.arange(2 * held) >= held
@@ -65,7 +65,7 @@ def held_recording(seed, held, drift=0.0, noisy=1.0):
     for name in CHANNELS:
         value = HELD.get(name, HELD["p2"])
         true = np.where(after, 0.2 * value, value) + drift * np.arange(2 * held) * PERIOD
-        signals[name] = SENSORS[name].measure(true, noisy * rng.standard_normal(2 * held))
+        signals[name] = SENSORS[name].measure(true, rng.standard_normal(2 * held))
         signals[name] *= UNITS[name][1]
     return Recording(
         name=f"test{seed}", role="calibration", period=PERIOD, sigma_S=np.zeros(2 * held), **signals
@@ -80,9 +80,3 @@ def test_the_noise_of_a_campaign_is_table_3_s(drift):
     noise = campaign_noise(campaign)
     for name in CHANNELS:
         assert noise[name] == pytest.approx(expected(name), rel=0.05)
-
-
-def test_noise_finer_than_a_step_counts_as_a_rounding_error():
-    quiet = held_recording(0, 200, noisy=0.0)
-    campaign = Campaign(name="bench", temperature=293.0, pressure=1e5, recordings=(quiet,))
-    assert campaign_noise(campaign)["U"] == pytest.approx(SENSORS["U"].resolution / np.sqrt(12))

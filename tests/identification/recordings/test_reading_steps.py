@@ -8,7 +8,7 @@ import pytest
 
 from identification.readings_noise import quantisation_step
 from identification.recordings.campaign_files import read_campaign, write_campaign
-from identification.recordings.noise import campaign_noise, campaign_steps, coarse_step_warnings
+from identification.recordings.noise import campaign_steps, coarse_step_warnings
 from identification.recordings.recording import PRESSURES, CampaignError
 from tests.identification.disturbances import round_pressures
 from tests.identification.recordings.good_campaign import good_campaign
@@ -46,30 +46,25 @@ def test_continuous_readings_have_no_step():
     assert quantisation_step([np.ones(1000)], fewest=1) == 0.0
 
 
-def test_fine_readings_have_no_coarse_step():
-    assert campaign_steps(good_campaign().recordings) == {}
-    assert coarse_step_warnings({}) == []
-
-
 def test_the_steps_of_a_bus_are_found_and_said():
     steps = campaign_steps(coarse(held("p1", 12e5)).recordings)
     assert steps == pytest.approx(dict.fromkeys(PRESSURES, 5e3))
     (sentence,) = coarse_step_warnings(steps)
     assert "p1 50 mbar" in sentence
     assert "dead sensor" in sentence
+    assert campaign_steps(good_campaign().recordings) == {}
+    assert coarse_step_warnings({}) == []
 
 
-@pytest.mark.parametrize("supply", [None, held("p1", 12e5)])
-def test_a_campaign_in_coarse_steps_is_accepted(tmp_path, supply):
-    write_campaign(coarse(supply), tmp_path)
+def still(recording):
+    return {name: np.full(len(recording), 1e5) for name in PRESSURES}
+
+
+@pytest.mark.parametrize(("change", "which"), [(None, 0), (held("p1", 12e5), 0), (still, 2)])
+def test_a_campaign_in_coarse_steps_is_accepted(tmp_path, change, which):
+    """Its supply may read the same throughout, and at rest every pressure."""
+    write_campaign(coarse(change, which), tmp_path)
     assert len(read_campaign(tmp_path).recordings) == 3
-
-
-def test_a_record_at_rest_may_read_the_same_throughout(tmp_path):
-    write_campaign(
-        coarse(lambda r: {name: np.full(len(r), 1e5) for name in ("p1", "p2", "p3")}, 2), tmp_path
-    )
-    assert np.ptp(read_campaign(tmp_path).recordings[2].p3) == 0
 
 
 @pytest.mark.parametrize(
@@ -85,14 +80,6 @@ def test_what_cannot_be_is_refused_in_coarse_steps_too(tmp_path, change, message
         write_campaign(coarse(change), tmp_path)
     assert re.search(message, str(caught.value))
     assert not any(tmp_path.iterdir())
-
-
-def test_rounding_is_the_least_noise():
-    """Readings in coarse steps rest for longer than the noise is read off."""
-    noise = campaign_noise(replace(coarse(), recordings=coarse().recordings[:2]))
-    for name in ("p2", "p3"):
-        assert noise[name] * (1 + 1e-9) >= 5e3 / np.sqrt(12)
-    assert noise["I"] == pytest.approx(campaign_noise(good_campaign())["I"], rel=0.3)
 
 
 def test_readings_of_another_grid_do_not_borrow_the_step():

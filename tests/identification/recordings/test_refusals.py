@@ -115,12 +115,6 @@ def with_column(cells: list[list[str]], name: str) -> None:
         row.append("12.0" if number else name)
 
 
-def gauge(folder: Path) -> None:
-    """Every pressure of test1.csv less that of the environment."""
-    for name in ("p1_bar", "p2_bar", "p3_bar"):
-        column(name, lambda values: values - 1.0)(folder)
-
-
 def linked(folder: Path) -> None:
     """test1.csv lies elsewhere."""
     target = folder.parent / f"{folder.name}-outside.csv"
@@ -154,17 +148,14 @@ CSV_FILES = [  # damage, place, rule, remedy
     (rows(lambda c: c.pop(600)), "line 601", "0.299 to 0.3 and must be uniform", "cut the recording"),
     (column("time_s", lambda t: t + 0.0002 * (t > 0.3)), "line 603", "uniform sampling has", "resample"),
     (column("time_s", jittered), "line ", "rounding to the printed digits does not", "resample"),
-    (column("time_s", lambda t: 5 * t), "line ", "time_s looks 5 times too long", "true sampling rate"),
     (rows(lambda c: c.__delitem__(slice(1, None))), "line 2", "ends after 0 samples", "for longer"),
     (rows(lambda c: c.__delitem__(slice(81, None))), "line 82", "needs at least 81", "for longer"),
     (held("I_A", slice(None), 0.5), "lines 2 to 1302", "I_A is 0.5 throughout", "check its sensor"),
     (held("p3_bar", slice(None), 16), "lines 2 to 1302", "p3_bar is 16 throughout", "check its sensor"),
     (column("p2_bar", lambda p: 1e2 * p), "lines 2 to 1302", "looks like kPa", "divide by 100"),
-    (gauge, "lines 2 to ", "p1_bar and p2_bar and p3_bar look like gauge", "give bar absolute .add the"),
     (column("p3_bar", lambda p: p - p.min()), "lines 2 to", "p3 falls to", "check unit, sign and"),
     (cell("p2_bar", 40, "16.3"), "line 40", r"p2_bar is 16.3, outside .*\[1, 16\]", "check unit and"),
     (cell("I_A", 40, "1.02"), "line 40", r"I_A is 1.02, outside .*\[-1, 1\]", "check unit and scaling"),
-    (column("I_A", lambda i: 1e3 * i), "lines 2 to", "I_A looks like mA", "divide by 1000"),
     (held("p2_bar", slice(300, 400), 16.256), "lines 302 to 401", "p2_bar is stuck at 16.256", "record"),
     (held("p3_bar", slice(300, 341), 1.0), "lines 302 to 342", "p3_bar is stuck at 1,", "the sensor"),
     (held("U_V", slice(None), 0), "lines 2 to 1302", "U_V never switches", "the role quality"),
@@ -178,7 +169,6 @@ OTHER_ROLES = [
     ("validation.csv", held("U_V", slice(None), 24, "validation.csv"), "lines 2 to 1302", "U_V never"),
     ("validation.csv", held("U_V", slice(5, 9), 0, "validation.csv"), "line 7", "start energised"),
     ("rest.csv", held("p1_bar", slice(None), 1, "rest.csv"), "lines 2 to 1001", "p1_bar is 1 through"),
-    ("rest.csv", column("p3_bar", lambda p: 100 * p, "rest.csv"), "lines 2 to", "p3_bar looks like kPa"),
     ("rest.csv", rows(lambda c: c.__delitem__(slice(1000, None)), "rest.csv"), "line 1001", "at least"),
 ]  # fmt: skip
 

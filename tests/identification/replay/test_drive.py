@@ -6,11 +6,7 @@ import numpy as np
 import pytest
 
 from identification.replay import model_inputs as drive
-from identification.replay.model_inputs import (
-    model_inputs,
-    smooth_supply,
-    smooth_voltage,
-)
+from identification.replay.model_inputs import model_inputs, smooth_supply, smooth_voltage
 from tests.identification.twins import TRUE, exact_recording, truth
 
 NOISE = 680.0

@@ -3,7 +3,6 @@
 import json
 import re
 from dataclasses import replace
-from functools import cache
 from pathlib import Path
 
 import gymnasium
@@ -11,39 +10,27 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers EPValve-v0
-from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant
 from identification.__main__ import main
-from identification.bench.programmes import DIAGNOSIS_SUITE
-from identification.bench.session import measured_campaign, run_programme
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.recording import Campaign, CampaignError, Recording
 from identification.valve_gap.diagnose import diagnose_campaign, possible_plants, subject
 from identification.valve_gap.valve import Valve
-from tests.identification.browser import check_layout
-from tests.identification.valve_gap.small_catalogue import LEFT_OUT
+from tests.identification.valve_gap.campaigns import MANY, all_but, campaign
 
 NAMES = ("test1", "low_supply", "validation")
 
 
-@cache
-def campaign(**effect: float) -> Campaign:
-    truth = Parameters.calibrated().replace(**effect)
-    programmes = [programme for programme in DIAGNOSIS_SUITE if programme.name in NAMES]
-    truths = [run_programme(truth, programme) for programme in programmes]
-    return measured_campaign(truths, truth, seed=3, offsets={})
-
-
-def damaged(change, **effect: float) -> Campaign:
+def damaged(change) -> Campaign:
     """The campaign with every recording changed."""
-    whole = campaign(**effect)
+    whole = campaign(*NAMES)
     return replace(whole, recordings=tuple(change(recording) for recording in whole.recordings))
 
 
 @pytest.fixture(scope="module")
 def diagnosed(tmp_path_factory) -> Path:
     folder = tmp_path_factory.mktemp("gap")
-    write_campaign(campaign(G_eddy=4e-3), folder / "campaign")
+    write_campaign(campaign(*NAMES, G_eddy=4e-3), folder / "campaign")
     assert main(["gap", str(folder / "campaign"), "--out", str(folder / "out")]) == 0
     return folder
 
@@ -62,22 +49,20 @@ def test_the_command_names_the_effect_and_writes_its_files(diagnosed):
 
 def test_finished_fits_belong_to_the_whole_plant_and_its_surroundings():
     """Not only to the parameters that are fitted."""
-    plant, warm = Plant.calibrated(), replace(campaign(), temperature=313.0)
+    plant, warm = Plant.calibrated(), replace(campaign(*NAMES), temperature=313.0)
     others = replace(plant, voltage=18.0), replace(plant, parameters=plant.parameters.replace(V2=2e-3))
-    found = [Valve(campaign(), each) for each in (plant, *others)]
+    found = [Valve(campaign(*NAMES), each) for each in (plant, *others)]
     first, again, *rest = (subject(each, (), {}) for each in (found[0], *found, Valve(warm, plant)))
     assert first == again
     assert all(first != each for each in rest)
 
 
-def test_its_report_has_words_for_equations_and_parameters(diagnosed, tmp_path):
-    path = diagnosed / "out" / "report.html"
-    page = path.read_text()
+def test_its_report_has_words_for_equations_and_parameters(diagnosed):
+    page = (diagnosed / "out" / "report.html").read_text()
     assert "voltage balance of the coil" in page
     assert "resistance of the solenoid (R)" in page
     assert "eddy current in the solenoid&#39;s iron (eddy_current)" in page
     assert not re.search(r"(?<![(\w])(eddy_current|parameter:)", page)
-    check_layout(path, tmp_path)
 
 
 def test_its_plant_file_goes_into_the_environment(diagnosed):
@@ -122,20 +107,14 @@ def test_possible_plants_hold_nearly_all_probability_no_cause_included(diagnosed
     assert unnamed.region.centre["G_eddy"] == 0.0 < likely.region.centre["G_eddy"]
 
 
-def assert_alike(found, expected) -> None:
-    """Equal but for rounding: sums of many numbers depend on the number of threads."""
-    if isinstance(expected, dict):
-        assert found.keys() == expected.keys()
-        for key in expected:
-            assert_alike(found[key], expected[key])
-    elif isinstance(expected, list):
-        assert len(found) == len(expected)
-        for own, other in zip(found, expected, strict=True):
-            assert_alike(own, other)
-    elif isinstance(expected, float):
-        assert found == pytest.approx(expected, rel=1e-6, abs=1e-12)
-    else:
-        assert found == expected
+def flat(content, name: str = "") -> dict[str, object]:
+    """The values of a JSON content by their places."""
+    pairs = content.items() if isinstance(content, dict) else enumerate(content)
+    found = {}
+    for key, value in pairs:
+        nested = isinstance(value, (dict, list))
+        found |= flat(value, f"{name}/{key}") if nested else {f"{name}/{key}": value}
+    return found
 
 
 def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
@@ -149,13 +128,14 @@ def test_finished_fits_are_taken_up_again(diagnosed, monkeypatch, tmp_path):
     again = json.loads((diagnosed / "out" / "gap.json").read_text())
     for volatile in ("seconds", "next_experiment"):
         del first[volatile], again[volatile]
-    assert_alike(again, first)
+    # Equal but for rounding: sums of many numbers depend on the number of threads.
+    assert flat(again) == pytest.approx(flat(first), rel=1e-6, abs=1e-12)
     with pytest.raises(AssertionError, match="kept fit"):
         diagnose_campaign(diagnosed / "campaign", diagnosed / "out", without=["flow_force"])
 
 
 def test_without_its_effect_the_gap_is_unknown(diagnosed, tmp_path):
-    without = ["eddy_current", *LEFT_OUT]
+    without = all_but("local_gas_speed", *MANY)
     found = diagnose_campaign(diagnosed / "campaign", tmp_path, without=without, report=False)
     assert found.conclusion.verdict in ("unknown", "no_gap")
     assert not found.conclusion.ambiguity_set
@@ -188,12 +168,18 @@ def in_milliamperes_of_another_range(recording: Recording) -> Recording:
     return replace(recording, I=2.0 * recording.I)
 
 
-@pytest.mark.parametrize("damage", [noise_only, in_milliamperes_of_another_range])
-def test_damaged_recordings_never_give_a_confident_cause(damage, tmp_path):
+@pytest.mark.parametrize(
+    ("damage", "causes"),
+    [
+        (noise_only, ("eddy_current", *MANY)),
+        (in_milliamperes_of_another_range, ("current_sensor_gain", "flyback_voltage", "coil_heating")),
+    ],
+)
+def test_damaged_recordings_never_give_a_confident_cause(damage, causes, tmp_path):
     try:
         write_campaign(damaged(damage), tmp_path / "campaign")
         found = diagnose_campaign(
-            tmp_path / "campaign", tmp_path / "out", without=LEFT_OUT, report=False
+            tmp_path / "campaign", tmp_path / "out", without=all_but(*causes), report=False
         )
     except CampaignError:
         return  # refused, which is as good

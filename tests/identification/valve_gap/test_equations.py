@@ -6,21 +6,17 @@ import numpy as np
 import pytest
 
 from epv_env.plant.equations import Inputs, State
-from epv_env.plant.parameters import Parameters
-from identification.bench.programmes import DIAGNOSIS_SUITE
-from identification.bench.session import measured_campaign, run_programme
 from identification.gap.plant import StateEquation, window_forcing
 from identification.valve_gap.equations import EQUATIONS, FORCINGS
 from identification.valve_gap.valve import Valve
+from tests.identification.valve_gap.campaigns import campaign
 
-PROGRAMMES = [p for p in DIAGNOSIS_SUITE if p.name in ("test1", "validation", "rest")]
 BY_NAME = {equation.name: equation for equation in EQUATIONS}
 
 
 @cache
 def valve() -> Valve:
-    truth = Parameters.calibrated()
-    return Valve(measured_campaign([run_programme(truth, p) for p in PROGRAMMES], truth, seed=3))
+    return Valve(campaign("test1", "validation", "rest"))
 
 
 def values() -> dict[str, np.ndarray]:

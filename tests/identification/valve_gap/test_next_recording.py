@@ -9,14 +9,15 @@ import numpy as np
 import pytest
 
 from epv_env.plant.parameters import Parameters
-from identification.bench.programmes import REPORT_SUITE, load_programmes
-from identification.bench.session import measured_campaign, run_programme
+from identification.bench.programmes import load_programmes
+from identification.bench.session import run_programme
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.judge.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
 from identification.report_2003 import Case
 from identification.valve_gap.diagnose import _plan
 from identification.valve_gap.next_recording import CANDIDATES, next_recording, planned, separation
 from identification.valve_gap.valve import Valve
+from tests.identification.valve_gap.campaigns import campaign
 
 TRUTH, LEAK = Parameters.calibrated(), {"A_PV": 2e-7}
 OPENING = replace(CANDIDATES[0], case=Case(name="opening", openings=(0.12,), duration=0.6))
@@ -25,8 +26,7 @@ BLINK = replace(OPENING, p2=8.9e5, case=Case(name="blink", openings=(0.002,), du
 
 @cache
 def valve() -> Valve:
-    runs = [run_programme(TRUTH, p) for p in REPORT_SUITE if p.name in ("test1", "validation")]
-    return Valve(measured_campaign(runs, TRUTH, seed=3))
+    return Valve(campaign("test1", "validation"))
 
 
 def answer(name: str = "", **sizes: float) -> Estimate:

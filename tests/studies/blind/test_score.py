@@ -1,18 +1,53 @@
 """Scores of labels and answers made by hand, whose counts are known."""
 
+import numpy as np
 import pytest
 
 from docs.studies.blind.score import (
+    answers,
+    expected_calibration_error,
     figures,
     is_correct,
     is_tied,
     score_trial,
-    share,
 )
 from docs.studies.blind.study import AT_LEAST, AT_MOST, rows
 from docs.studies.blind.truth import ABSORBED
-from tests.studies.blind.hand_made import CLAMP, EDDY, NOTHING, answer, label
 
+
+def label(kind="one", effects=("eddy_current",), visible=None, explainable=2.0, trial=0):
+    """Content of sealed.json, as far as scores read it."""
+    return {
+        "trial": trial, "kind": kind, "effects": list(effects),
+        "visible": list(effects if visible is None else visible),
+        "gap": {"explainable": explainable},
+    }  # fmt: skip
+
+
+NOTHING = label("none", (), explainable=1.0)
+
+
+def answer(verdict="known", *causes, component="solenoid", named=1, inclusion=None):
+    """Content of gap.json, as far as scores read it.
+
+    causes: (effects, probability) in order; the first `named` are the ambiguity set. inclusion: by
+    effect; None: the sum over the causes that hold it.
+    """
+    sums: dict[str, float] = {}
+    for effects, probability in causes:
+        sums |= {effect: sums.get(effect, 0.0) + probability for effect in effects}
+    return {
+        "verdict": verdict,
+        "where": {"component": {component: 0.9, "flow": 0.1} if component else {}},
+        "causes": [{"effects": list(effects), "probability": p} for effects, p in causes],
+        "ambiguity_set": [list(effects) for effects, _ in causes[:named]],
+        "inclusion": sums if inclusion is None else inclusion,
+        "seconds": 10.0,
+    }
+
+
+EDDY = (["eddy_current"], 0.9)
+CLAMP = (["flyback_voltage"], 0.08)
 BOTH = ["eddy_current", "flyback_voltage"]
 PAIR = label("pair", BOTH)
 RIGHT = ("named_right", "truth_in_set", "component_right", "well_judged")
@@ -95,13 +130,6 @@ def test_a_struck_effect_may_be_left_open_but_not_replaced():
     assert counted["Diagnosis failed"] == (1, 6)
 
 
-def test_intervals_are_exact():
-    """No hit in n: the upper end is 1 - 0.025^(1/n)."""
-    found = share([False] * 60)
-    assert (found["low"], found["high"]) == pytest.approx((0.0, 1 - 0.025 ** (1 / 60)))
-    assert share([])["value"] is None
-
-
 def study():
     """Ten trials with one cause: nine found, one missed; one without an effect; one that failed."""
     found = [score_trial(label(trial=i), answer("known", EDDY)) for i in range(9)]
@@ -119,3 +147,33 @@ def test_shares_means_and_what_is_asked_of_a_study():
     assert cells["False alarms without an effect"] == ("0 of 0: - (0 to 1)", "at most 0")
     assert (AT_LEAST | AT_MOST).keys() <= cells.keys()
     assert dict(zip(cells, rows(found, "strong"), strict=True))["Component right"][2] == "at least 0.95"
+
+
+def error(probabilities, truths):
+    return expected_calibration_error(np.array(probabilities), np.array(truths, dtype=bool))
+
+
+def test_an_overconfident_judge_has_the_error_that_hands_compute():
+    """Of 39 answers at 0.995, 33 are right; of 16 at 0.91, 13: both lie in the topmost bin.
+
+    A judge who is too sure in one bin and not sure enough in another errs in both.
+    """
+    sure = error([0.995] * 39 + [0.91] * 16, [1] * 33 + [0] * 6 + [1] * 13 + [0] * 3)
+    assert sure == pytest.approx((53.365 - 46) / 55)
+    mixed = error([0.95] * 10 + [0.55] * 10, [1] * 8 + [0] * 2 + [1] * 9 + [0])
+    assert mixed == pytest.approx((1.5 + 3.5) / 20)
+
+
+def test_a_named_cause_is_wrong_where_none_is_right():
+    """Named right, named where nothing is, named for a struck effect, and not named."""
+    said = [
+        (label(), answer("known", EDDY, CLAMP)),
+        (NOTHING, answer("known", EDDY)),
+        (label("left_out", ["flow_force"]), answer("ambiguous", CLAMP)),
+        (label(), answer("unknown", EDDY)),
+        (NOTHING, answer("no_gap", (["eddy_current"], 0.005))),
+        (label(), None),
+    ]
+    trials = [score_trial(*pair) for pair in said]
+    probability, right = answers(trials)
+    assert (list(probability), list(right)) == ([0.9, 0.9, 0.08], [True, False, False])

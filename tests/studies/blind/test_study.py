@@ -67,18 +67,13 @@ def hashes(folder):
     return [line.split()[0] for line in (folder / COMMITMENTS).read_text().splitlines()]
 
 
-def test_the_commitment_is_the_hash_of_the_label(folder):
+def test_the_commitment_is_the_hash_of_the_label_and_made_before_the_first_diagnosis(folder):
     for number, (trial, committed) in enumerate(zip(trials(folder), hashes(folder), strict=True)):
         assert hashlib.sha256((trial / LABEL).read_bytes()).hexdigest() == committed
         label = open_label(trial, committed)
-        assert label["trial"] == number
-        assert len(label["salt"]) == 32
-
-
-def test_the_truths_are_committed_to_before_the_first_diagnosis(folder):
+        assert (label["trial"], len(label["salt"])) == (number, 32)
     first = min(path.stat().st_mtime_ns for path in folder.glob("*/diagnosis/seen.json"))
-    last = max(path.stat().st_mtime_ns for path in folder.glob(f"*/{LABEL}"))
-    assert last < first
+    assert max(path.stat().st_mtime_ns for path in folder.glob(f"*/{LABEL}")) < first
 
 
 def test_a_diagnosis_gets_a_campaign_and_nothing_else(folder):

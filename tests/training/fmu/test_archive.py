@@ -94,22 +94,10 @@ def test_without_a_compiler_the_sources_are_there(tmp_path, capsys):
 
 
 def test_the_same_plant_gives_the_same_sources(model):
-    again = plant_model(Plant.calibrated())
-    assert fmu(model, "") == fmu(again, "")
-
-
-@pytest.mark.parametrize(
-    ("words", "sentence"),
-    [
-        (("plant", "--plant", "missing.json"), "cannot read plant file missing.json"),
-        (("missing",), "cannot read a policy from missing"),
-    ],
-)
-def test_bad_input_is_one_sentence_and_nothing_is_written(tmp_path, capsys, words, sentence):
-    out = tmp_path / "out"
-    assert run(*words, "--out", out) == 2
-    assert sentence in capsys.readouterr().err
-    assert not out.exists()
+    content = fmu(model, "")
+    assert fmu(plant_model(Plant.calibrated()), "") == content
+    with zipfile.ZipFile(io.BytesIO(content)) as archive:
+        assert archive.testzip() is None
 
 
 @needs_compiler
@@ -159,12 +147,6 @@ def test_fmpy_validates_and_simulates_it(model, tmp_path):
     (p2,) = instance.get("p2")
     assert found["p2"][-1] == pytest.approx(p2, abs=10.0)
     assert found["p2"].min() < 7.5e5
-
-
-def test_the_archive_is_a_plain_zip(model):
-    with zipfile.ZipFile(io.BytesIO(fmu(model, ""))) as archive:
-        assert archive.testzip() is None
-        assert not any("\\" in name or name.startswith("/") for name in archive.namelist())
 
 
 def test_the_description_survives_any_plant_name(tmp_path):

@@ -8,7 +8,6 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as xml
 
-DOUBLES = ctypes.POINTER(ctypes.c_double)
 LOGGER = ctypes.CFUNCTYPE(
     None, ctypes.c_void_p, *[ctypes.c_char_p, ctypes.c_int, *[ctypes.c_char_p] * 3]
 )
@@ -128,7 +127,3 @@ class Instance:
             "DeSerializeFMUstate", content, ctypes.c_size_t(len(content)), ctypes.byref(state)
         )
         return state if status == OK else None
-
-    def free(self) -> None:
-        """End the instance."""
-        self.unit.function("FreeInstance")(ctypes.c_void_p(self.handle))

@@ -1,10 +1,13 @@
-"""The benchmark's relief valve: its integrators agree on impacts and on maxima of the lift."""
+"""The benchmarks: the relief valve's integrators agree; workloads count what they simulate."""
 
 import numpy as np
 import pytest
 
+from tests.benchmarks.interfaces import INTERFACES
+from tests.benchmarks.relief_device import run_device, trajectories
 from tests.benchmarks.relief_peers import NoOdeintError, build, run_odeint, run_scipy
-from tests.benchmarks.relief_valve import Task, run_lanes
+from tests.benchmarks.relief_valve import Result, Task, run_lanes
+from tests.env.test_device import compiles, simulated
 
 TASK = Task(flows=np.array([0.5, 2.0, 5.0, 7.0, 9.0]), transient=3, recorded=3)
 
@@ -21,6 +24,17 @@ def test_impacts_and_maxima_agree_with_scipy(true):
     found, _ = run_lanes(TASK, 2.5e-3)
     assert found.error(true) < 1e-8
     assert found.passed.tolist() == true.passed.tolist()
+
+
+def test_a_simulated_device_finds_what_the_lanes_find(tmp_path):
+    ((found, _), _) = simulated(tmp_path, run_device, [{"task": TASK, "step": 1e-2}])[0]
+    assert found.error(run_lanes(TASK, 1e-2)[0]) < 1e-9
+
+
+def test_the_kernel_compiles_for_an_accelerator(monkeypatch):
+    found = Result.empty(TASK)
+    arguments = (TASK.flows, 1e-2, TASK.transient, found.impacts, found.maxima, found.passed)
+    assert compiles(trajectories, arguments, monkeypatch)
 
 
 def test_error_falls_with_the_fourth_power_of_the_step(true):
@@ -52,3 +66,20 @@ def test_odeint_agrees_with_scipy(true, tmp_path):
     found, seconds = run_odeint(program, TASK, 1e-10)
     assert found.error(true) < 1e-7
     assert seconds > 0.0
+
+
+SHARE = 0.005
+"""Of a workload's usual length."""
+
+
+@pytest.mark.training
+def test_a_workload_counts_whole_periods_of_all_its_valves():
+    pytest.importorskip("stable_baselines3")
+    for name, interface in INTERFACES.items():
+        valves = next((n for n in (256, 1024) if f"{n} valves" in name), 1)
+        run = interface.begin(SHARE)
+        periods = run()
+        assert periods > 0, name
+        assert periods % valves == 0, name
+        assert run() == periods, name
+        assert interface.kernel is None or interface.kernel in INTERFACES
