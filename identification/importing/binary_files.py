@@ -15,6 +15,7 @@ from epv_env.common.files import LARGEST_FILE
 from identification.importing import times
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import (
+    ImportingError,
     SourceChannel,
     check_number,
     limited,
@@ -161,7 +162,7 @@ def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
 
 
 def _check_unpacked(path: Path) -> None:
-    """Raises ValueError if the compressed variables of a MATLAB 5 file, as they say, are too large."""
+    """Raises ImportingError if the compressed variables of a MATLAB 5 file, as they say, are too large."""
     content, at, unpacked = path.read_bytes(), 128, 0
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     while order and at + 8 <= len(content):
@@ -171,7 +172,9 @@ def _check_unpacked(path: Path) -> None:
             unpacked += struct.unpack(f"{order}II", begin)[1]
         at += 8 + size
     if unpacked > LARGEST_FILE:
-        raise ValueError(f"unpacked it is larger than {LARGEST_FILE:,} bytes")
+        raise ImportingError(
+            f"{path} unpacks to more than {LARGEST_FILE:,} bytes: export the bench's channels alone"
+        )
 
 
 COMPRESSED = 15

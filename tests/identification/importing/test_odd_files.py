@@ -144,5 +144,5 @@ def test_a_small_file_that_unpacks_to_two_gigabytes_is_refused_at_once(tmp_path)
     head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H2s", 0x0100, b"IM")
     path = tmp_path / "bomb.mat"
     path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
-    with pytest.raises(ValueError, match="unpacked it is larger than 1,073,741,824 bytes"):
+    with pytest.raises(ImportingError, match="unpacks to more than 1,073,741,824 bytes"):
         read_matlab(path)
