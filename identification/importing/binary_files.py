@@ -162,7 +162,7 @@ def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
 
 
 def _check_unpacked(path: Path) -> None:
-    """Raises ImportingError if the compressed variables of a MATLAB 5 file, as they say, are too large."""
+    """Raises ImportingError if the variables of a MATLAB 5 file say that they unpack too large."""
     content, at, unpacked = path.read_bytes(), 128, 0
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     while order and at + 8 <= len(content):
