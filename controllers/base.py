@@ -6,13 +6,15 @@ from typing import Any, ClassVar, Protocol, runtime_checkable
 
 import numba
 import numpy as np
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from epv_env.common.compilation import announce_compilation
 from epv_env.observation import CENTRE, SCALE
 from epv_env.plant.primitives import source_digest
 from epv_env.task import LimitingTask
 
-compiled: Callable[..., Any] = numba.njit(error_model="numpy")
+compiled: Callable[..., Any] = register_jitable(error_model="numpy", no_cfunc_wrapper=True)
 """Decorator of the functions of one valve."""
 composed: Callable[..., Any] = numba.njit(error_model="numpy", inline="always")
 """Decorator of those that mainly call others: numba compiles them together with their caller, once."""
@@ -75,6 +77,7 @@ class OneValve:
 
     def reset(self, n: int) -> None:
         """Forget everything; n episodes begin."""
+        announce_compilation()
         self.memory = np.zeros(n, self.record)
 
     def act(self, observations: NDArray) -> NDArray:

@@ -78,8 +78,8 @@ _RULES = ("control_period", "supply_voltage", "settling_time", *(f.name for f in
 RULES = np.dtype((np.record, [(name, np.float64) for name in _RULES]))
 """Record of the settings that a period needs, by their names."""
 
-_digitised, _two_point, _scaled = exact(digitised), exact(two_point), exact(scaled)
-_reward_terms, _total = exact(reward_terms), exact(total)
+for _rule in (digitised, two_point, scaled, reward_terms, total):
+    exact(_rule)
 
 _SENSOR = np.array([CHANNEL[name].sensor.constants() for name in MEASURED])
 _P1, _P2, _P3, _I = (MEASURED.index(name) for name in ("p1", "p2", "p3", "I"))
@@ -130,7 +130,7 @@ def follow_target_steps(e, end):
 @exact
 def refilled(e, p1, begin):
     """Delivery of the compressor [kg/s] at a supply pressure p1 [Pa] in the period from `begin` [s]."""
-    e.compressor = _two_point(p1, e.compressor, e.cut_in, e.cut_out) and begin >= e.idle_until
+    e.compressor = two_point(p1, e.compressor, e.cut_in, e.cut_out) and begin >= e.idle_until
     return e.delivery * e.compressor
 
 
@@ -148,12 +148,12 @@ def judge(e, rules, p2, lowest, highest, vented, figures, i):
     failed = figures[FAILED, i] != 0.0 or p2 <= _EMPTY
     settled = e.steps * rules.control_period > rules.settling_time
     e.violated |= settled and abs(deviation) > BAND_BAR
-    terms = _reward_terms(
+    terms = reward_terms(
         rules, rules.control_period, error, above, below, figures[SWITCHINGS, i], vented, failed
     )
     for row in range(N_TERM):
         figures[row, i] = terms[row]
-    figures[REWARD, i] = _total(terms)
+    figures[REWARD, i] = total(terms)
     figures[FAILED, i] = failed
     figures[DEVIATION, i] = deviation
     figures[VENTED, i] = vented
@@ -168,7 +168,7 @@ def measure(e, state, p, normal, time):
         if k == _P3 and time > e.p3_frozen_at:
             continue
         low, noise, resolution, least, greatest = _SENSOR[k]
-        e.reading[k] = _digitised(true[k], normal[k], low, noise, resolution, least, greatest)
+        e.reading[k] = digitised(true[k], normal[k], low, noise, resolution, least, greatest)
 
 
 @exact
@@ -184,7 +184,7 @@ def remember(e):
 @exact
 def _show(row, k, value):
     """Write entry k of an observation."""
-    row[k] = _scaled(value, CENTRE[k], SCALE[k], LIMIT[k])
+    row[k] = scaled(value, CENTRE[k], SCALE[k], LIMIT[k])
 
 
 @exact

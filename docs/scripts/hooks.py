@@ -65,6 +65,21 @@ def on_page_content(html: str, **_: Any) -> str:
     )
 
 
+NARROWER = {"76.25em": "72em", "76.234375em": "71.984375em"}
+"""Widths from which the theme shows the menu beside the page: by ours, a window of 1200 px does."""
+
+
+def on_post_build(config: Any) -> None:
+    """Show the menu on narrower screens."""
+    for folder in ("stylesheets", "javascripts"):
+        for path in Path(config.site_dir, "assets", folder).glob("*.min.*"):
+            if path.suffix in (".css", ".js"):
+                text = path.read_text("utf-8")
+                for old, new in NARROWER.items():
+                    text = text.replace(old, new)
+                path.write_text(text, "utf-8")
+
+
 def _modules(package: Path) -> list[Path]:
     """Python files of one folder that hold code, alphabetically, without `__init__.py`."""
     return sorted(file for file in package.glob("*.py") if not file.name.startswith("__"))

@@ -152,7 +152,7 @@ def delayed_parts(inputs, duration, numbers):
 
 @exact
 def integrate(numbers, inputs, duration, lowest, highest, work, queue, extended):
-    """Advance a valve through the parts of its period."""
+    """Advance a valve through the parts of its period. extended: as of `derivative`."""
     state, effects = numbers[:N_STATE], numbers[EFFECTS:WITH_EFFECTS]
     queue[VALVE, 0], queue[WAITING, 0], queue[WAITING, 1], queue[STEPS, 0] = NONE, 0, 1, 0
     work[REMAINING, 0] = work[EVENT, 0] = 0.0
@@ -193,7 +193,7 @@ def one_period(with_effects: bool) -> Any:
         if with_effects and v.numbers[WITH_EFFECTS, 0] != 0.0:
             integrate(v.numbers, inputs, duration, lowest, highest, work, queue, True)
         else:
-            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, False)
+            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, None)
         end_period(v.episodes, rules, noise, state, before, lowest, highest, v.sensors, figures,
                    observation, 0, 1)  # fmt: skip
 

@@ -181,12 +181,12 @@ def piston_force(q, c, effects, extended):
     The control pressure p3 acts on the whole back; p1 on the ring, p2 on the seat.
     """
     seat = c.seat_diameter
-    if extended:
+    if extended is not None:
         seat = effective_seat_diameter(q.xPV, q.p1, q.p2, seat, effects)
     seat_area = QUARTER_PI * seat * seat
     pressure = (q.p1 - q.p3) * c.piston_area - (q.p1 - q.p2) * seat_area
     force = pressure - c.cPV * (q.xPV + c.xPV0) - c.kPV * q.vPV
-    if extended:
+    if extended is not None:
         force -= effects.flow_force * c.curtain_PV * q.xPV * (q.p1 - q.p2)
         size = piston_friction(q, effects)
         force = friction(force, q.xPV, q.vPV, c.xPVmax, size, SLIDING_SPEED_PV)
@@ -212,13 +212,13 @@ def reluctance_inverse(q, c):
 def armature_force(q, c, inverse_Rm, effects, extended):
     """Net force on the MV armature, pull-in positive [N] (eq. 11)."""
     current, half = q.I, 0.5
-    if extended:
+    if extended is not None:
         current = q.I + effects.I_rem
         half = saturated_force(saturation_level(current, inverse_Rm, effects.force_saturation))
     flux_linkage = current * inverse_Rm
     magnetic = half * c.N_squared * flux_linkage * flux_linkage * c.gap_reluctance
     force = magnetic - c.cMV * (q.xMV + c.xMV0) - c.kMV * q.vMV
-    if extended:
+    if extended is not None:
         force += effects.inlet_area * (q.p1 - q.p3) - effects.exhaust_area * (q.p3 - c.p_env)
         force = friction(force, q.xMV, q.vMV, c.xMVmax, effects.friction_MV, SLIDING_SPEED_MV)
     return force
@@ -228,7 +228,7 @@ def armature_force(q, c, inverse_Rm, effects, extended):
 def current_rate(q, u, c, inverse_Rm, effects, extended):
     """dI/dt [A/s] (eq. 12 with the sign of docs/explanation/plant-model.md, correction 6)."""
     current, per_inductance = q.I, c.N_squared_inverse * reluctance(q, c)
-    if extended:
+    if extended is not None:
         current = q.I + effects.I_rem
         flattened = 1.0 + saturation_level(current, inverse_Rm, effects.saturation)
         per_inductance *= flattened * flattened
@@ -243,7 +243,7 @@ def current_rate(q, u, c, inverse_Rm, effects, extended):
 def flow_PV(q, c, effects, extended):
     """Mass flow from the input to the output chamber through the PV seat [kg/s] (eq. 6)."""
     area, share = c.curtain_PV * q.xPV, 1.0
-    if extended:
+    if extended is not None:
         area = area * discharge(q.p1, q.p2, effects) + effects.leak_PV
         share = 1.0 - effects.drop_deficit
     return area * mass_flux(q.p1, q.p2, c.inverse_sqrt_RT, share)
@@ -253,7 +253,7 @@ def flow_PV(q, c, effects, extended):
 def flow_inlet(q, c, effects, extended):
     """Mass flow from the input to the control chamber [kg/s] (eq. 7): smaller of curtain, orifice."""
     area, share = min(c.curtain_in * q.xMV, c.orifice_in), 1.0
-    if extended:
+    if extended is not None:
         area = opened(area, c.orifice_in, effects.leak_inlet, effects.beside_inlet)
         share = 1.0 - effects.drop_deficit
     return area * mass_flux(q.p1, q.p3, c.inverse_sqrt_RT, share)
@@ -264,7 +264,7 @@ def flow_exhaust(q, c, effects, extended):
     """Mass flow from the control chamber to ambient [kg/s] (the exhaust that eq. 7 leaves out)."""
     area, share = min(c.curtain_exh * (c.xMVmax - q.xMV), c.orifice_exh), 1.0
     inverse_sqrt_RT = c.inverse_sqrt_RT
-    if extended:
+    if extended is not None:
         area = opened(area, c.orifice_exh, effects.leak_exhaust, effects.beside_exhaust)
         share = 1.0 - effects.drop_deficit
         inverse_sqrt_RT /= math.sqrt(1.0 + q.heat_3)
@@ -274,7 +274,7 @@ def flow_exhaust(q, c, effects, extended):
 @inlined
 def flow_circuit_leak(q, c, effects, extended):
     """Mass flow from the circuit to ambient through its leak [kg/s]."""
-    if extended:
+    if extended is not None:
         share = 1.0 - effects.drop_deficit
         return effects.leak_circuit * mass_flux(q.p2, c.p_env, c.inverse_sqrt_RT, share)
     return 0.0
@@ -332,11 +332,12 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
 
     These forces include the friction of a mover at rest on a stop; a mover that is let go has none yet.
 
-    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: a literal
-    bool; False compiles the effects away. Returns (State of rates, piston force, armature force).
+    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: True, or None,
+    for which numba drops the effects before it types them. Returns (State of rates, piston force,
+    armature force).
     """
     feed_MV = q
-    if extended:
+    if extended is not None:
         feed_MV = _with_supply(q, q.p1 - effects.supply_MV * q.supply_drop)
         q = _with_supply(q, q.p1 - effects.supply_PV * q.supply_drop)
         effects = with_laws(q, effects)
@@ -348,7 +349,7 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
     exhaust = flow_exhaust(q, c, effects, extended)
     leak = flow_circuit_leak(q, c, effects, extended)
     moving_PV, moving_MV = force_PV, force_MV
-    if extended:
+    if extended is not None:
         force_PV += u.force_PV
         force_MV += u.force_MV
         moving_PV = force_PV + stop_friction(q.xPV, q.vPV, c.xPVmax, piston_friction(q, effects))

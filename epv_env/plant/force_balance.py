@@ -4,7 +4,7 @@ The checks are for a valve of one's own, whose parameters no table bounds. They 
 without compiling them, since each is needed once.
 """
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 
@@ -32,26 +32,21 @@ def opening_force(p: Parameters, supply: float) -> float:
     supply: p1 [Pa absolute]. Eq. 22 at rest.
     """
     q = _at_rest(p)._replace(p1=supply)
-    return float(_python(equations.piston_force)(q, folded(p, np.inf), None, False))
+    return float(equations.piston_force(q, folded(p, np.inf), None, None))
 
 
 def pull_in_force(p: Parameters, current: float, stroke: float) -> float:
     """Net force on the armature [N] at rest at a stroke [m], for a current [A] (eq. 11)."""
     q, c = _at_rest(p)._replace(xMV=stroke, I=current), folded(p, np.inf)
-    inverse_Rm = 1.0 / _python(equations.reluctance)(q, c)
-    return float(_python(equations.armature_force)(q, c, inverse_Rm, None, False))
+    inverse_Rm = 1.0 / equations.reluctance(q, c)
+    return float(equations.armature_force(q, c, inverse_Rm, None, None))
 
 
 def venting_rate(p: Parameters) -> float:
     """Rate at which choked flow through the open exhaust empties the control chamber [1/s] (eq. 7)."""
     c, far = folded(p, np.inf), 100.0 * p["p_env"]
-    flux = _python(mass_flux)(far, p["p_env"], c.inverse_sqrt_RT)
+    flux = mass_flux(far, p["p_env"], c.inverse_sqrt_RT)
     return float(c.RT_V3 * min(c.curtain_exh * c.xMVmax, c.orifice_exh) * flux / far)
-
-
-def _python(function: Callable[..., float]) -> Callable[..., float]:
-    """The function itself behind a compiled one."""
-    return getattr(function, "py_func", function)
 
 
 def _at_rest(p: Parameters) -> State:

@@ -91,7 +91,7 @@ def go_on(work, lane, queue, state, coefficients, effects, inputs, duration, low
             queue[VALVE, lane], queue[PERIOD, lane], queue[STEPS, lane] = valve, 0, 0
             copy_column(state, 0, valve, work, STATE, lane, N_STATE)
             copy_column(coefficients, 0, valve, work, COEFFICIENT, lane, N_COEFFICIENT)
-            if extended:
+            if extended is not None:
                 copy_column(effects, 0, valve, work, EFFECT, lane, N_EFFECT)
             p2 = state_at(work, STATE, lane).p2
             work[LOWEST, lane] = min(lowest[valve], p2)
@@ -144,7 +144,7 @@ def _compile(extended, digest):
     return run
 
 
-run_nominal = _compile(False, _DIGEST)
+run_nominal = _compile(None, _DIGEST)
 """Advance lanes first..last of a batch through one or more periods, in place.
 
 state [N_STATE, lanes], coefficients, effects; inputs [period, N_INPUT, lanes]; duration [period, lanes]

@@ -110,7 +110,7 @@ def relative_error(difference, h, step, extended):
     """Estimated error of a step over its tolerance [-]; difference: State, to the midpoint rule."""
     d = difference
     pressure = max(abs(d.p2), abs(d.p3))
-    if extended:
+    if extended is not None:
         sensors = max(abs(d.lag_2), abs(d.lag_3))
         pressure = max(max(pressure, sensors), max(abs(d.far_pressure), abs(d.supply_drop)))
     error = max(pressure * (1.0 / PRESSURE_TOLERANCE), abs(d.I) * (1.0 / CURRENT_TOLERANCE))

@@ -223,7 +223,7 @@ def _stepper(lanes):
             free_MV = 0.0 if held_MV else 1.0
             longest = first_step(rates, step, LONGEST * step) if held_PV & held_MV else step
             h = min(min(longest, hint), remaining)
-            if extended:
+            if extended is not None:
                 h = min(h, longest_step(u.U, q, effects, free_PV, free_MV))
             end, forces, difference = remaining_stages(
                 q, held_still(rates, free_PV, free_MV), u, c, effects, free_PV, free_MV, h, extended
@@ -235,7 +235,7 @@ def _stepper(lanes):
             kinked = _passes(q.xMV, end.xMV, c.kink_in) | _passes(q.xMV, end.xMV, c.kink_exh)
             let_go = _lets_go(held_PV, force_PV, end_PV) | _lets_go(held_MV, force_MV, end_MV)
             again = (located == 1.0) & (h > step)  # located once, on too long a step to be exact
-            if extended:
+            if extended is not None:
                 again |= (located > 0.0) & (located < RELEASE_LOCATIONS)
             event = beyond | ((located == 0.0) & (kinked | let_go)) | (again & let_go)
             error = relative_error(difference, h, step, extended)
@@ -245,12 +245,12 @@ def _stepper(lanes):
             xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
             xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
             current = end.I
-            if extended:
+            if extended is not None:
                 acting = with_laws(end, effects)
                 current = coil_current(u.U, end.I, c.R, end.coil_heat, acting)
             landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
             reached = chosen_state(refused, q, landed)
-            if extended:
+            if extended is not None:
                 store_state(work, TRIAL, lane, end)
                 store_state(work, STATE, lane, reached)
             else:

@@ -6,6 +6,7 @@ is a smooth function of the delay, as a fit needs it. Before the run the first s
 """
 
 import keyword
+import re
 from collections import namedtuple
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,6 +15,7 @@ from typing import Any
 import numba
 import numpy as np
 from numba.core.errors import NumbaError
+from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 from identification.gap.fit.laws import KNOTS, MOST_LAWS
@@ -66,11 +68,11 @@ class Records:
         self.u = record("input", (TIME, *self.inputs))
         self.p = record("parameter", self.symbols)
 
-    def flat(self, function: Callable, count: int, wrap: Callable) -> Callable:
+    def flat(self, function: Callable, count: int) -> Callable:
         """A function (x, t, u, p, out) of arrays that writes `count` results into `out`.
 
         The arrays' axes are states, inputs, symbols with the laws behind them, and results. The text is
-        generated, as numba needs every field written out. wrap: compiles a function, or leaves it.
+        generated, as numba needs every field written out.
         """
         x = ", ".join(f"x[{i}]" for i in range(len(self.states)))
         u = ", ".join(["t", *(f"u[{i}]" for i in range(len(self.inputs)))])
@@ -83,9 +85,9 @@ class Records:
             "    return out",
         ]
         names = {"function": function, "State": self.x, "Input": self.u, "Parameter": self.p}
-        names["lawful"] = wrap(self._lawful())
+        names["lawful"] = compiled(self._lawful())
         exec("\n".join(lines), names)
-        return names["flat"]
+        return compiled(names["flat"])
 
     def _lawful(self) -> Callable:
         """A function (x, u, p) that gives the symbols as strong as their laws make them."""
@@ -113,13 +115,17 @@ class Records:
         return lawful
 
 
+_registered = register_jitable(error_model="numpy", no_cfunc_wrapper=True)
+
+
 def compiled(function: Callable) -> Callable:
-    """The function compiled by numba; divisions by zero give inf, as in numpy."""
-    return function if hasattr(function, "py_func") else numba.njit(error_model="numpy")(function)
+    """The function, which compiled ones may call, too; divisions by zero then give inf, as in numpy."""
+    return function if hasattr(function, "py_func") else _registered(function)
 
 
+@compiled
 def delayed_mean(total: NDArray, since: float, length: float) -> float:
-    """Mean of a held input over a stretch; numba compiles this function.
+    """Mean of a held input over a stretch.
 
     total: integral of the input, (samples + 1,). since, length: of the stretch [sampling periods].
     """
@@ -131,21 +137,21 @@ def delayed_mean(total: NDArray, since: float, length: float) -> float:
     return (values[1] - values[0]) / length
 
 
-def stepping(rate: Callable, wrap: Callable) -> Callable:
+def stepping(rate: Callable) -> Callable:
     """A function (x, t, h, u, p, push, work): a classical Runge-Kutta step of x (states,) by h [s].
 
     push: forcing of the rates, (states,). work: scratch, (5, states): four slopes and a stage.
 
-    rate: derivatives of the states, as `Records.flat` makes it. wrap: compiles a function, or leaves it.
+    rate: derivatives of the states, as `Records.flat` makes it.
     """
 
-    @wrap
+    @compiled
     def slope(x, t, u, p, push, out):
         rate(x, t, u, p, out)
         for i in range(len(x)):
             out[i] += push[i]
 
-    @wrap
+    @compiled
     def step(x, t, h, u, p, push, work):
         slope(x, t, u, p, push, work[0])
         for stage in range(1, 4):
@@ -186,25 +192,30 @@ class Job:
     n) for none."""
 
 
-def alone(step: Callable, read: Callable, channels: int, wrap: Callable) -> Simulation:
+def _reason(error: NumbaError) -> str:
+    """The innermost of numba's nested reasons, without its colours."""
+    lines = re.sub(r"\x1b\[\d*m", "", str(error)).splitlines()
+    words = re.compile("No implementation|Untyped|Unsupported|Unknown|Use of|Cannot")
+    return next((line.strip() for line in reversed(lines) if words.search(line)), lines[0])
+
+
+def alone(step: Callable, read: Callable, channels: int, *, compile_it: bool) -> Simulation:
     """A simulation in which each candidate has a loop of its own.
 
     Args:
         step: of `stepping`.
         read: readings from states, as `Records.flat` makes it.
         channels: number of readings.
-        wrap: compiles a function, or leaves it as it is.
+        compile_it: whether numba compiles the loop, with all that it calls.
     """
-    mean = wrap(delayed_mean)
 
-    @wrap
+    @compiled
     def finite(x):
         total = 0.0
         for value in x:
             total += value
         return np.isfinite(total)
 
-    @wrap
     def loop(x, inputs, total, delays, p, period, substeps, push, work, states, readings):
         u, none = np.empty(inputs.shape[1]), np.zeros(len(x))
         for k in range(len(inputs)):
@@ -217,11 +228,15 @@ def alone(step: Callable, read: Callable, channels: int, wrap: Callable) -> Simu
                     if delays[i] == 0.0:
                         u[i] = inputs[k, i]
                     else:
-                        u[i] = mean(total[:, i], begin - delays[i] / period, 1.0 / substeps)
+                        u[i] = delayed_mean(total[:, i], begin - delays[i] / period, 1.0 / substeps)
                 if s == 0:
-                    states[:, k] = x
+                    for i in range(len(x)):  # numba compiles a slice with sentences for its errors
+                        states[i, k] = x[i]
                     read(x, k * period, u, p, readings[:, k])
                 step(x, begin * period, period / substeps, u, p, pushed, work)
+
+    if compile_it:
+        loop = numba.njit(error_model="numpy")(loop)
 
     def simulate(job: Job) -> tuple[NDArray, NDArray]:
         n, work = job.start.shape[1], np.empty((5, len(job.start)))
@@ -240,10 +255,8 @@ def alone(step: Callable, read: Callable, channels: int, wrap: Callable) -> Simu
             except ArithmeticError:
                 continue  # functions such as math.exp refuse what numpy calls inf
             except NumbaError as error:
-                lines = [line for line in str(error).splitlines() if "File" not in line and line.strip()]
-                reason = next((line for line in lines if "Failed in" not in line), lines[0])
                 raise ValueError(
-                    f"rate or readings cannot be compiled by numba ({reason}): let them use "
+                    f"rate or readings cannot be compiled by numba ({_reason(error)}): let them use "
                     "numbers, numpy and functions under numba.njit only, or choose mode='python'"
                 ) from error
         return np.moveaxis(readings, 0, -1), np.moveaxis(states, 0, -1)
@@ -264,9 +277,9 @@ def simulator(records: Records, functions: Sequence[tuple[Callable, int]], mode:
     """
     if mode not in ("compiled", "python"):
         raise ValueError(f"mode '{mode}' is none of compiled, python: choose one of them")
-    own: Callable = compiled if mode == "compiled" else lambda function: function
-    rate, read = (own(records.flat(own(f), results, own)) for f, results in functions)
-    return alone(stepping(rate, own), read, functions[1][1], own)
+    used = compiled if mode == "compiled" else lambda function: function
+    rate, read = (records.flat(used(f), results) for f, results in functions)
+    return alone(stepping(rate), read, functions[1][1], compile_it=mode == "compiled")
 
 
 def settled_steps(read: Callable[[int], Sequence[NDArray]]) -> int:

@@ -1,5 +1,7 @@
 """Measurement files of MDF, TDMS, Parquet and MATLAB, read by the packages of their formats."""
 
+import struct
+import zlib
 from collections.abc import Iterator, Mapping
 from decimal import Decimal
 from pathlib import Path
@@ -9,9 +11,11 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
+from epv_env.common.files import LARGEST_FILE
 from identification.importing import times
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import (
+    ImportingError,
     SourceChannel,
     check_number,
     limited,
@@ -151,9 +155,30 @@ def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
         content = needed_package("pymatreader", "MATLAB 7.3 files").read_mat(str(path))
         version = "MATLAB 7.3"
     else:
+        _check_unpacked(path)
         content = scipy.io.loadmat(path, simplify_cells=True)
         version = "MATLAB 5"
     return version, limited(path, _matlab_channels("", content))
+
+
+def _check_unpacked(path: Path) -> None:
+    """Raises ImportingError if the variables of a MATLAB 5 file say that they unpack too large."""
+    content, at, unpacked = path.read_bytes(), 128, 0
+    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
+    while order and at + 8 <= len(content):
+        kind, size = struct.unpack_from(f"{order}II", content, at)
+        if kind == COMPRESSED:
+            begin = zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], 8)
+            unpacked += struct.unpack(f"{order}II", begin)[1]
+        at += 8 + size
+    if unpacked > LARGEST_FILE:
+        raise ImportingError(
+            f"{path} unpacks to more than {LARGEST_FILE:,} bytes: export the bench's channels alone"
+        )
+
+
+COMPRESSED = 15
+"""Type of a compressed variable; within it stand its own type and its size."""
 
 
 def _matlab_channels(path: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:

@@ -8,10 +8,12 @@ import sys
 import tomllib
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from epv_env.common.commands import commands, main, main_of
+from epv_env.common.compilation import Announcer
 from epv_env.common.results_folder import only_writer
 
 GREET = '''"""Write a greeting.
@@ -130,30 +132,26 @@ def test_nothing_stays_of_a_start_that_failed(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-COMPILING = """
-import numba
-from epv_env.env import EPValveEnv
-env = EPValveEnv()
-env.reset()
-env.step(1)
-def double(x):
-    return 2 * x
-for module in {modules}:
-    double.__module__ = module
-    numba.njit(double)(3)
-"""
-
-
-def test_what_no_cache_holds_is_announced_once():
+def test_what_a_cache_will_hold_is_announced_once_and_counted(capsys, monkeypatch):
     """A module None is that of code made from text."""
+    announcer = Announcer()
 
-    def said(*modules: str | None) -> str:
-        words = [sys.executable, "-c", COMPILING.format(modules=modules)]
-        return subprocess.run(words, capture_output=True, text=True, check=True).stderr
+    def compile_in(module: str | None, kept: str | None) -> str:
+        stats = SimpleNamespace(cache_path=kept)
+        event = SimpleNamespace(data={"dispatcher": SimpleNamespace(__module__=module, stats=stats)})
+        inner = SimpleNamespace(data={"dispatcher": SimpleNamespace(__module__=None, stats=stats)})
+        for given in (event, inner):
+            announcer.on_start(given)
+        for given in (inner, event):
+            announcer.on_end(given)
+        return capsys.readouterr().err
 
-    said()  # fills the cache
-    assert said(None) == ""
-    assert said("epv_env.a", "epv_env.b") == "compiling for this machine: a minute or two, once\n"
+    for module, kept in ((None, "/c"), ("scipy.a", "/c"), ("epv_env.a", None)):
+        assert compile_in(module, kept) == ""
+    assert compile_in("epv_env.a", "/c") == "compiling for this machine: up to a minute, once\n"
+    assert compile_in("epv_env.b", "/c") == ""
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    assert compile_in("epv_env.c", "/c") == "\r5 functions compiled\r6 functions compiled\n"
 
 
 def test_the_version_is_that_of_the_package(package, capsys):

@@ -216,7 +216,7 @@ def test_a_winding_warms_with_its_power_up_to_where_it_cools_as_fast():
     np.testing.assert_allclose(run.state.coil_heat, last, rtol=1e-9)
 
 
-CHAMBER = chamber_rates.py_func
+CHAMBER = chamber_rates
 
 
 def test_a_chamber_emptied_and_filled_adiabatically_ends_at_kappa_times_the_supply_s_temperature():
@@ -252,7 +252,7 @@ def test_behind_a_shut_pipe_the_circuit_is_small_and_the_rest_supplies_the_consu
     p = CALIBRATED.replace(s_pipe=0.6, A_pipe=0.0, A_circuit=2e-7)
     start = energised(p, p1=9e5, p2=8e5, U=24.0)
     run = simulate(p, initial=start, U=np.full(500, 24.0), period=1e-3, sigma_S=1e-3)
-    per_pressure = -float(mass_flux.py_func(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
+    per_pressure = -float(mass_flux(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
     near = 8e5 * np.exp(-RT / (0.4 * p["V2"]) * 2e-7 * per_pressure * run.time)
     np.testing.assert_allclose(run.state.p2, near, rtol=1e-6)
     far = 8e5 - RT / (0.6 * p["V2"]) * 1e-3 * run.time
@@ -278,7 +278,7 @@ def test_the_supply_loses_pressure_with_the_square_of_the_flow():
 def test_a_leak_of_the_circuit_is_exponential_while_it_chokes():
     p = CALIBRATED.replace(A_circuit=2e-7)
     run = simulate(p, initial=energised(p, p1=9e5, p2=8e5, U=24.0), U=np.full(2000, 24.0), period=1e-3)
-    per_pressure = -float(mass_flux.py_func(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
+    per_pressure = -float(mass_flux(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
     expected = 8e5 * np.exp(-RT / p["V2"] * 2e-7 * per_pressure * run.time)
     np.testing.assert_allclose(run.state.p2, expected, rtol=1e-6)
 
@@ -298,7 +298,7 @@ def test_orifices_choke_where_the_effect_says():
     """Against the ellipse of ISO 6358 with critical ratio b, which the stretched form resembles."""
     b = 0.3
     share = (1 - CRITICAL_RATIO) / (1 - b)
-    flux = mass_flux.py_func
+    flux = mass_flux
     choked = flux(1e6, 1e5, 1.0, share)
     for ratio in (0.05, 0.2, 0.299):
         assert flux(1e6, 1e6 * ratio, 1.0, share) == pytest.approx(choked)
@@ -317,7 +317,7 @@ def test_break_away_takes_the_excess_on_top():
         start = energised(p, p1=12e5, p2=6e5, U=24.0)._replace(p3=p3)
         run = simulate(p, initial=start, U=np.full(4, 24.0), period=2.5e-4)
         assert (np.max(run.state.xPV) > 0) == opens
-    relative = [stribeck.py_func(v, 0.8) for v in (0.0, STRIBECK_SPEED, -STRIBECK_SPEED, 10.0)]
+    relative = [stribeck(v, 0.8) for v in (0.0, STRIBECK_SPEED, -STRIBECK_SPEED, 10.0)]
     np.testing.assert_allclose(relative, (1.8, 1.4, 1.4, 1.0), rtol=1e-4)
 
 

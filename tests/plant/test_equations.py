@@ -131,14 +131,9 @@ def test_magnet_conserves_energy_and_as_printed_would_create_it(printed):
     assert electrical - heat - stored == pytest.approx(expected, rel=1e-9)
 
 
-@numba.njit
-def _piston_force(q, c, effects, extended):
-    return piston_force(q, c, effects, True) if extended else piston_force(q, c, effects, False)
-
-
 def _force(p, q, extended):
     c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_constants(p)[:, 0])
-    return _piston_force(q, c, e, extended)
+    return piston_force(q, c, e, True if extended else None)
 
 
 def test_piston_balances_at_the_control_pressure_of_a_hand_calculation():

@@ -55,7 +55,7 @@ def test_growth_is_linear_between_its_knots_and_constant_beyond(argument, slot):
     parts = {name: at * weight / len(weights) for name, weight in weights.items()}
     states = [State(*(parts.get(name, 0.0 * at)[k] for name in State._fields)) for k in range(61)]
     terms = Terms(*(getattr(e, f"law{slot}_{name}") for name in Terms._fields))
-    found = [growth.py_func(q, terms) for q in states]
+    found = [growth(q, terms) for q in states]
     met = np.abs(at) if argument.startswith("|") else at
     expected = np.interp(met, np.linspace(low, high, KNOTS), GROWTH)
     np.testing.assert_allclose(found, np.maximum(expected, -1.0), rtol=0, atol=1e-9)
@@ -94,7 +94,7 @@ def test_a_law_multiplies_the_strengths_of_its_effect_and_nothing_else(name):
     every = {symbol: size for other in LAWFUL for symbol, size in trial(other).items()}
     e = Effects(*effect_constants({**CALIBRATED, **every, **law(name, growth=KNOTS * (0.5,))})[:, 0])
     expected = {strength: 1.5 * getattr(e, strength) for strength in effect(name).strength}
-    found = with_laws.py_func(State(*[0.0] * len(State._fields)), e)
+    found = with_laws(State(*[0.0] * len(State._fields)), e)
     assert all(expected.values())
     assert found._asdict() == {**e._asdict(), **expected}
 

@@ -118,7 +118,7 @@ epv_env.plant.coefficients makes them.
 """
 
 
-def compiled_right_hand_side(extended: bool, digest: str = _DIGEST) -> RightHandSide:
+def compiled_right_hand_side(extended: bool | None, digest: str = _DIGEST) -> RightHandSide:
     """`derivative` for one valve as a compiled function of arrays."""
 
     @numba.njit(cache=True, **FLAGS)
@@ -138,7 +138,7 @@ def compiled_right_hand_side(extended: bool, digest: str = _DIGEST) -> RightHand
     return rates_and_forces
 
 
-COMPILED_RIGHT_HAND_SIDES = {extended: compiled_right_hand_side(extended) for extended in (False, True)}
+COMPILED_RIGHT_HAND_SIDES = {False: compiled_right_hand_side(None), True: compiled_right_hand_side(True)}
 """Compiled on first use."""
 
 

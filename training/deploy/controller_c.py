@@ -6,6 +6,7 @@ record is a structure; the table of the plant and the settings of the pulses are
 """
 
 import ast
+import inspect
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -184,7 +185,7 @@ class _Body(Body):
             return self.length(text), WHOLE
         if callee is int:
             return f"((real)(int)({text}))", REAL
-        if not hasattr(callee, "py_func") or node.keywords:
+        if not inspect.isfunction(getattr(callee, "py_func", callee)) or node.keywords:
             self.refuse(node)
         done = self.c.function(callee, tuple(self.held(kind) for _, kind in values))
         passed = []

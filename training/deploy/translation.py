@@ -251,6 +251,8 @@ class Body:
                 return self.joined(JUNCTIONS[type(op)], left, right), self.TRUTH
             case ast.BoolOp(op=op, values=values):
                 return self.joined(JUNCTIONS[type(op)], *values), self.TRUTH
+            case ast.Compare(left=left, ops=[ast.IsNot()], comparators=[ast.Constant(value=None)]):
+                return self.condition(left), self.TRUTH
             case ast.Compare(left=left, ops=[op], comparators=[right]) if type(op) in COMPARISONS:
                 return self.joined(COMPARISONS[type(op)], left, right), self.TRUTH
             case ast.UnaryOp(op=ast.USub(), operand=operand):

@@ -16,18 +16,17 @@ import math
 from pathlib import Path
 from typing import Any, TypeAlias
 
-import numba
 import numpy as np
 from numba import types
-from numba.extending import intrinsic
+from numba.extending import intrinsic, register_jitable
 from numpy.polynomial import Polynomial, chebyshev
 
 FLAGS = {"fastmath": {"nnan", "ninf", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
-inlined = numba.njit(forceinline=True, **FLAGS)
+inlined = register_jitable(forceinline=True, no_cfunc_wrapper=True, **FLAGS)
 """Decorator for the small functions that the kernels absorb."""
 
-exact = numba.njit(forceinline=True, error_model="numpy")
+exact = register_jitable(forceinline=True, no_cfunc_wrapper=True, error_model="numpy")
 """Decorator for functions of numbers that give what NumPy gives, to the bit: nothing is contracted."""
 
 

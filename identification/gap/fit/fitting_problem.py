@@ -110,6 +110,13 @@ def cause_places(estimate: Estimate) -> list[tuple[Cause, slice, slice]]:
     return places
 
 
+def slopes_kept(kept: str | None, begun: NuisanceSlopes | None) -> NuisanceSlopes | None:
+    """An estimate's own slopes: none, all with which its fit began, or only those by nuisances."""
+    if kept == "nuisances" and begun is not None:
+        return replace(begun, calibrated=None)
+    return begun if kept else None
+
+
 class FitCache:
     """Runs the steps of a diagnosis; a step that the journal holds is not run again."""
 
@@ -145,17 +152,16 @@ class FitCache:
     ) -> list[Estimate]:
         """The estimates that `fit` returns, or returned in an earlier run under this step's name.
 
-        slopes: gives an estimate of an earlier run its nuisance slopes, which a journal does not keep.
+        slopes: those with which the fit to an estimate began, which a journal does not keep.
         """
         step = self.prefix + step
         self.announce(step)
         if self.journal is not None and step in self.journal:
 
             def read(found: list[dict[str, Any]]) -> list[Estimate]:
-                estimates = [self._estimate(entry) for entry in found]
                 return [
-                    replace(each, slopes=slopes(each)) if entry["own_slopes"] else each
-                    for each, entry in zip(estimates, found, strict=True)
+                    replace(each, slopes=slopes_kept(entry["slopes"], slopes(each)))
+                    for each, entry in ((self._estimate(entry), entry) for entry in found)
                 ]
 
             return self.journal.read(step, read)
@@ -169,7 +175,7 @@ class FitCache:
                     "chi_square": estimate.chi_square,
                     "converged": estimate.converged,
                     "given_up": estimate.given_up,
-                    "own_slopes": estimate.slopes is not None,
+                    "slopes": estimate.slopes and ("all" if estimate.slopes.calibrated else "nuisances"),
                     "laws": [
                         [o.cause.label, o.argument, o.low, o.high] for o in estimate.hypothesis.laws
                     ],

@@ -39,8 +39,10 @@ def recalibrate(
     calibrated = cache(f"{prefix}calibration", lambda: fit(rough, [start]))[0]
     slopes = nuisance_slopes(rough, [calibrated], [np.zeros(len(plant.tolerances))])[0]
     problem = FittingProblem(plant, slopes, thorough=thorough)
-    base = cache(f"{prefix}recalibration", lambda: fit(problem, [restarted(calibrated)]))[0]
-    return problem, base
+    fits = cache(
+        f"{prefix}recalibration", lambda: fit(problem, [restarted(calibrated)]), problem.slopes_of
+    )
+    return problem, fits[0]
 
 
 def restarted(estimate: Estimate) -> Estimate:

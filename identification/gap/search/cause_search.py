@@ -150,7 +150,7 @@ class HypothesisPool:
                 starts += [start.estimate for start in found[:1]]
             return fit(self.problem, starts, iterations=FIRST_ITERATIONS)
 
-        slopes = {frozenset(each.labels): each.estimate.slopes for each in chosen}
+        slopes = {frozenset(e.labels): self.problem.slopes_of(e.estimate) for e in chosen}
         found = self.cache(
             f"one law more: {_names(chosen)}", fits,
             lambda estimate: slopes[frozenset(estimate.hypothesis.labels)],
@@ -240,7 +240,7 @@ def _fit_beside(
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
     beside = f"beside {name or ' and '.join(hypothesis.labels) or 'nothing'}"
-    pool.add(pool.cache(beside, fits, lambda estimate: base.slopes))
+    pool.add(pool.cache(beside, fits, lambda estimate: problem.slopes_of(base)))
 
 
 def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:
@@ -274,7 +274,7 @@ def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseS
         starts = best_start_of_each(simulated_starts(problem, base, base_runs, together))
         return fit(problem, [start.estimate for start in starts], base.chi_square)
 
-    pool.add(pool.cache("pairs", fits))
+    pool.add(pool.cache("pairs", fits, lambda estimate: problem.slopes_of(base)))
 
 
 def _leave_causes_out(pool: HypothesisPool) -> None:
@@ -294,7 +294,8 @@ def _leave_causes_out(pool: HypothesisPool) -> None:
             laws = tuple(law for law in hypothesis.laws if law.cause in causes)
             starts.append(problem.start(Hypothesis(causes=causes, laws=laws), values))
         name = f"without one of {' and '.join(best.labels)}"
-        pool.add(pool.cache(name, lambda starts=starts: fit(problem, starts)))
+        found = pool.cache(name, lambda starts=starts: fit(problem, starts), problem.slopes_of)
+        pool.add(found)
         pool.finish(len(hypothesis.causes) - 1)
         if pool.posterior().hypotheses[0].labels == best.labels:
             return

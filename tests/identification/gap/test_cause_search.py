@@ -53,6 +53,7 @@ def test_a_search_that_is_resumed_gives_the_undisturbed_answer(tmp_path, monkeyp
     for first, again in zip(whole.hypotheses, resumed.hypotheses, strict=True):
         assert first.labels == again.labels
         np.testing.assert_array_equal(first.estimate.vector, again.estimate.vector)
+        np.testing.assert_array_equal(first.covariance, again.covariance)
 
 
 def test_a_catalogue_without_the_true_causes_names_none():

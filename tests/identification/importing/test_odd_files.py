@@ -2,10 +2,13 @@
 
 import json
 import re
+import struct
+import zlib
 
 import numpy as np
 import pytest
 
+from identification.importing.binary_files import read_matlab
 from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
@@ -133,3 +136,13 @@ def test_the_rest_is_refused_with_the_remedy(true, kind, tmp_path):
     write, message = REFUSED[kind]
     with pytest.raises(ImportingError, match=message):
         read_files([write(tmp_path / "run", true)], ambient_bar=1.0)
+
+
+def test_a_small_file_that_unpacks_to_two_gigabytes_is_refused_at_once(tmp_path):
+    size = 2**31
+    packed = zlib.compress(struct.pack("<II", 14, size) + bytes(1000))
+    head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H2s", 0x0100, b"IM")
+    path = tmp_path / "bomb.mat"
+    path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+    with pytest.raises(ImportingError, match="unpacks to more than 1,073,741,824 bytes"):
+        read_matlab(path)

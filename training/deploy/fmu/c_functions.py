@@ -126,9 +126,9 @@ class _PlantBody(Body):
             items = dict(zip(callee._fields, values, strict=False)) | keywords  # type: ignore[attr-defined]
             members = ", ".join(f".{name} = {text}" for name, (text, _) in items.items())
             return f"({kind}){{{members}}}", kind
-        if not hasattr(callee, "py_func"):
+        if not inspect.isfunction(callee):
             self.refuse(node)
-        parameters = list(inspect.signature(callee.py_func).parameters.values())
+        parameters = list(inspect.signature(callee).parameters.values())
         for parameter in parameters[len(values) :]:
             default = 0.0 if parameter.default is parameter.empty else parameter.default
             values.append(keywords.get(parameter.name) or (self.literal(default), NUMBER))
