@@ -92,5 +92,5 @@ def in_unit(observation, i):
 
 
 def decides_on_device(controller: Controller) -> bool:
-    """Whether an accelerator can run the controller's decisions beside the plant."""
-    return isinstance(controller, OneValve) and not isinstance(controller, Privileged)
+    """Whether an accelerator can run the controller: it acts by its compiled function alone."""
+    return getattr(type(controller), "act", None) is OneValve.act

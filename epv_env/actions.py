@@ -97,11 +97,11 @@ def _check_unmasked(actions: Any) -> None:
 
 
 def as_array(actions: Any) -> NDArray:
-    """Actions as an array, one without entries where their lengths differ. Raises ActionError."""
+    """Actions as an array, an empty one if they make none. Raises ActionError."""
     _check_unmasked(actions)
     try:
         return np.asarray(actions)
-    except ValueError:  # of several lengths
+    except (TypeError, ValueError):  # bfloat16, or of several lengths
         return np.empty(0, dtype=object)
 
 

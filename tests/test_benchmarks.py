@@ -4,8 +4,10 @@ import numpy as np
 import pytest
 
 from tests.benchmarks.interfaces import INTERFACES
+from tests.benchmarks.relief_device import run_device, trajectories
 from tests.benchmarks.relief_peers import NoOdeintError, build, run_odeint, run_scipy
-from tests.benchmarks.relief_valve import Task, run_lanes
+from tests.benchmarks.relief_valve import Result, Task, run_lanes
+from tests.env.test_device import compiles, simulated
 
 TASK = Task(flows=np.array([0.5, 2.0, 5.0, 7.0, 9.0]), transient=3, recorded=3)
 
@@ -22,6 +24,17 @@ def test_impacts_and_maxima_agree_with_scipy(true):
     found, _ = run_lanes(TASK, 2.5e-3)
     assert found.error(true) < 1e-8
     assert found.passed.tolist() == true.passed.tolist()
+
+
+def test_a_simulated_device_finds_what_the_lanes_find(tmp_path):
+    ((found, _), _) = simulated(tmp_path, run_device, [{"task": TASK, "step": 1e-2}])[0]
+    assert found.error(run_lanes(TASK, 1e-2)[0]) < 1e-9
+
+
+def test_the_kernel_compiles_for_an_accelerator(monkeypatch):
+    found = Result.empty(TASK)
+    arguments = (TASK.flows, 1e-2, TASK.transient, found.impacts, found.maxima, found.passed)
+    assert compiles(trajectories, arguments, monkeypatch)
 
 
 def test_error_falls_with_the_fourth_power_of_the_step(true):

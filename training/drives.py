@@ -82,14 +82,17 @@ def drives(
     *,
     voltage: float = 1.0,
     duration: float = DRIVE,
+    begun: Callable[[Valves], object] = lambda valves: None,
 ) -> NDArray:
     """What the control unit reads, (drives, periods, 6): coil, U [V], p1, p2, p3 [bar], I [A].
 
     chosen: options of the reset, lists with an entry for each drive. voltage: share of the plant's.
+    begun: is called with the valves when the drives begin.
     """
     options = {"plant": plant, "threads": 1, "supply_voltage": voltage * plant.voltage}
     env = make_env(controller, len(seeds), **options)
     observation = begin_episodes(env, controller, seeds, chosen)
+    begun(env.task.valves)
     rows = np.empty((len(seeds), round(duration / env.settings.control_period), 6))
     rows[:, :, 1] = env.settings.supply_voltage
     for k in range(rows.shape[1]):

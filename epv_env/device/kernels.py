@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numba.cuda
 import numpy as np
 from numba import float32, float64, int64
-from numba.core.errors import NumbaPerformanceWarning
 
 from epv_env.actions import on_off
 from epv_env.device.random import draw_normals, philox
@@ -108,7 +107,7 @@ def launch(kernel: Any, n: int, *arguments: Any) -> None:
     """Run a kernel in n threads. That few do not fill an accelerator is no news to who asked for few."""
     threads = min(THREADS, n)
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NumbaPerformanceWarning)
+        warnings.filterwarnings("ignore", message=".*Grid size")
         configured = kernel[-(-n // threads), threads]
     configured(*arguments)
 

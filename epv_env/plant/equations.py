@@ -254,7 +254,7 @@ def flow_inlet(q, c, effects, extended):
     """Mass flow from the input to the control chamber [kg/s] (eq. 7): smaller of curtain, orifice."""
     area, share = min(c.curtain_in * q.xMV, c.orifice_in), 1.0
     if extended:
-        area = opened(area, c.orifice_in, effects.leak_inlet)
+        area = opened(area, c.orifice_in, effects.leak_inlet, effects.beside_inlet)
         share = 1.0 - effects.drop_deficit
     return area * mass_flux(q.p1, q.p3, c.inverse_sqrt_RT, share)
 
@@ -265,7 +265,7 @@ def flow_exhaust(q, c, effects, extended):
     area, share = min(c.curtain_exh * (c.xMVmax - q.xMV), c.orifice_exh), 1.0
     inverse_sqrt_RT = c.inverse_sqrt_RT
     if extended:
-        area = opened(area, c.orifice_exh, effects.leak_exhaust)
+        area = opened(area, c.orifice_exh, effects.leak_exhaust, effects.beside_exhaust)
         share = 1.0 - effects.drop_deficit
         inverse_sqrt_RT /= math.sqrt(1.0 + q.heat_3)
     return area * mass_flux(q.p3, c.p_env, inverse_sqrt_RT, share)

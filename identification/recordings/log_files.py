@@ -19,7 +19,7 @@ from identification.recordings.campaign_files import (
     read_manifest,
 )
 from identification.recordings.columns import line_number, read_columns, sampling_period
-from identification.recordings.plausibility import check_units, gauge_contradiction
+from identification.recordings.plausibility import SensorFault, check_units, gauge_contradiction
 from identification.recordings.recording import HOLD, RULES, CampaignError, RecordingRules
 from identification.recordings.recording_checks import check_range
 
@@ -107,8 +107,13 @@ def read_log(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Log:
         path: _columns(path, period)
         for path in named_files(file, "drives", [entry.file for entry in manifest.drives])
     }
-    for path, drive in columns.items():
-        _check_readings(str(path), drive, period, pressure / BAR, rules)
+    every = [_fault(str(path), own, period, pressure / BAR, rules) for path, own in columns.items()]
+    faults = [fault for fault in every if fault]
+    if len(faults) == len(every):
+        raise faults[0]
+    for path, own in columns.items():
+        for name in ("U_supply_V", "p1_bar", "p2_bar", "p3_bar", "I_A"):
+            check_range(str(path), name, own[name], rules.sensors[name.split("_")[0]])
     _check_reference(Path(folder), list(columns.values()), period, pressure / BAR)
     return Log(
         name=manifest.name,
@@ -143,26 +148,26 @@ def _columns(path: Path, period: float) -> dict[str, NDArray]:
     return columns | {"U_V": coil * columns["U_supply_V"]}
 
 
-def _check_readings(
+def _fault(
     path: str, columns: Mapping[str, NDArray], period: float, ambient: float, rules: RecordingRules
-) -> None:
-    """Check a drive's readings as those of recordings are checked. Raises CampaignError.
+) -> SensorFault | None:
+    """A fault of a drive's sensors; the diagnosis is to find it, unless all drives have one.
 
     A wrong unit or reference contradicts physics in opening after opening, a fault of the valve in few.
-    ambient: p_env [bar absolute].
+    ambient: p_env [bar absolute]. Raises CampaignError for such readings.
     """
     found = list(_openings(columns["coil"], columns["p3_bar"], period))
-    checked, told = found[:: len(found) // MOST_CHECKED + 1], []
+    checked, told = found[:: len(found) // MOST_CHECKED + 1], list[CampaignError]()
     for part in checked:
         try:
             check_units("", {name: c[part] for name, c in columns.items()}, period, ambient, rules)
         except CampaignError as error:
             reason = str(error).partition(": ")[2].replace("U_V", "U_supply_V")
-            told.append(f"{path}, line {line_number(part.start)}: {reason}")
-    if len(told) > CONTRADICTED * len(checked):
-        raise CampaignError(told[0])
-    for name in ("U_supply_V", "p1_bar", "p2_bar", "p3_bar", "I_A"):
-        check_range(path, name, columns[name], rules.sensors[name.split("_")[0]])
+            told.append(type(error)(f"{path}, line {line_number(part.start)}: {reason}"))
+    first = told[0] if len(told) > CONTRADICTED * len(checked) else None
+    if first is None or isinstance(first, SensorFault):
+        return first
+    raise first
 
 
 def _check_reference(

@@ -17,8 +17,11 @@ from epv_env.common.units import BAR, GRAM
 from identification.recordings.log_files import LONGEST, Drive, Log
 from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
-REST_RANGE = 0.1 * BAR
-"""Range of p3 within HOLD below which the control chamber is at rest [Pa]."""
+REST_RANGE, SETTLING = 0.1 * BAR, 0.01
+"""Range of p3 within REST below which the control chamber is at rest [Pa], and how long it may still
+settle within this range [s]: what is left falls to a third every 5 ms."""
+REST = HOLD + SETTLING
+"""Time at rest before an opening [s]."""
 
 SHUT_BEFORE, SHUT_AFTER = 0.1, 0.1
 """Longest stretches with the valve shut that belong to an opening [s]."""
@@ -33,8 +36,9 @@ number of standard deviations [1] together."""
 STRAIGHT = 1.5
 """Scatter of p2 about a straight line, relative to its noise, up to which consumption is steady [1]."""
 
-OPENINGS_PER_DRIVE = 20
-"""Openings of a drive that are compared, evenly over the drive."""
+OPENINGS_PER_DRIVE, DRIVES = 20, 12
+"""Openings of a drive that are compared, evenly over the drive; of each drive of a log with more than
+DRIVES fewer, so that it takes no longer."""
 
 HELD_OUT_EVERY = 3
 """Every third opening is held out."""
@@ -117,11 +121,13 @@ def evenly(campaign: Campaign, preferred: Collection[str]) -> Campaign:
     Raises CampaignError where too few are left.
     """
     chosen: list[Recording] = []
-    for _, group in groupby(campaign.recordings, key=lambda recording: drive_of(recording.name)):
-        drive = list(group)
-        first = _spread([r for r in drive if r.name in preferred], OPENINGS_PER_DRIVE)
+    groups = groupby(campaign.recordings, key=lambda recording: drive_of(recording.name))
+    every = [list(group) for _, group in groups]
+    most = _of_each(OPENINGS_PER_DRIVE, len(every))
+    for drive in every:
+        first = _spread([r for r in drive if r.name in preferred], most)
         others = [r for r in drive if r.name not in preferred]
-        first += _spread(others, OPENINGS_PER_DRIVE - len(first))
+        first += _spread(others, most - len(first))
         chosen += sorted(first, key=lambda recording: start_of(recording.name))
     roles = ("calibration",) * (HELD_OUT_EVERY - 1) + ("validation",)
     recordings = tuple(
@@ -152,8 +158,13 @@ def pauses(log: Log, p: Mapping[str, float]) -> tuple[Recording, ...]:
             continue
         none = _Flow(0.0, 1.0, 1.0)
         resting = [_recording(drive, _Stretch(i, i + length, none, none), log.period) for _, i in lowest]
-        recordings += _spread(resting, PAUSES_PER_DRIVE)
+        recordings += _spread(resting, _of_each(PAUSES_PER_DRIVE, len(log.drives)))
     return tuple(recordings)
+
+
+def _of_each(most: int, drives: int) -> int:
+    """How many of the at most `most` of a drive are taken of each."""
+    return max(most * DRIVES // max(drives, DRIVES), 1)
 
 
 def _recording(drive: Drive, stretch: _Stretch, period: float) -> Recording:
@@ -177,7 +188,7 @@ def _enough(campaign: Campaign) -> Campaign:
     if len(campaign.recordings) < LEAST_OPENINGS:
         raise CampaignError(
             f"{campaign.name}: {len(campaign.recordings)} openings can be compared, too few: log "
-            f"at least {LEAST_OPENINGS}, from a valve shut for {HOLD * 1e3:g} ms, at steady consumption"
+            f"at least {LEAST_OPENINGS}, from a valve shut for {REST * 1e3:g} ms, at steady consumption"
         )
     return campaign
 
@@ -204,8 +215,8 @@ def _stretches(drive: Drive, period: float, storage: float) -> Iterator[_Stretch
 
 
 def _at_rest(drive: Drive, period: float) -> NDArray:
-    """Whether the coil has been on and p3 constant for HOLD, up to each sample; boolean (samples,)."""
-    hold = round(HOLD / period)
+    """Whether the coil has been on and p3 constant for REST, up to each sample; boolean (samples,)."""
+    hold = round(REST / period)
     if len(drive.coil) < hold:
         return np.zeros(len(drive.coil), dtype=bool)
     on = np.all(sliding_window_view(drive.coil, hold) > 0.0, axis=1)
@@ -217,9 +228,9 @@ def _stretch(
     drive: Drive, i: int, commands: NDArray, at_rest: NDArray, period: float, storage: float
 ) -> _Stretch | None:
     """The opening whose command is sample i; None where it does not end."""
-    hold, venting = round(HOLD / period), round(VENTING / period)
+    hold, venting = round(REST / period), round(VENTING / period)
     rest = i - int(np.argmin(at_rest[:i][::-1])) - (hold - 1)  # p3 has been constant since then
-    first = max(rest, i - round(SHUT_BEFORE / period), 0)
+    first = max(rest + round(SETTLING / period), i - round(SHUT_BEFORE / period), 0)
     shut = np.flatnonzero(at_rest[i : i + round(LONGEST / period)])
     if not shut.size:
         return None

@@ -16,6 +16,11 @@ from numpy.typing import NDArray
 from identification.recordings.columns import CHANNEL_OF, line_number
 from identification.recordings.recording import RULES, CampaignError, RecordingRules
 
+
+class SensorFault(CampaignError):
+    """Physics contradicts the readings, and no wrong unit, sign, reference or column explains them."""
+
+
 Signals = Mapping[str, NDArray]
 """Readings by channel, each (samples,) [A, V or bar]."""
 
@@ -171,10 +176,12 @@ def _refuse(
         and next(contradictions(m.corrected(signals), CORRECTED), None) is None
     )
     columns = ", ".join(names.values())
-    likely = next((m.text for m in explaining), f"check unit, sign and sensor of {columns}")
+    named = next((m.text for m in explaining), None)
+    likely = named or f"check unit, sign and sensor of {columns}"
     last = line_number(len(next(iter(signals.values()))) - 1)
     sign = ";" if ": " in likely else ":"
-    raise CampaignError(f"{file}, lines {line_number(0)} to {last}: {found}{sign} {likely}")
+    error = CampaignError if named else SensorFault
+    raise error(f"{file}, lines {line_number(0)} to {last}: {found}{sign} {likely}")
 
 
 def _exchanges(names: Mapping[str, str]) -> list[Misreading]:

@@ -6,6 +6,7 @@ A log does not hold the consumption: each opening has a nuisance for the error o
 from collections.abc import Collection, Mapping, Sequence
 from copy import copy
 from dataclasses import replace
+from itertools import combinations
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
@@ -17,15 +18,16 @@ from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant, load_plant
 from identification.gap.diagnosis import Diagnosis, diagnose, recalibrated_by_seen_noise
-from identification.gap.fit.fitting_problem import FitCache
-from identification.gap.fit.gauss_newton import linearise
+from identification.gap.fit.fitting_problem import FitCache, FittingProblem
+from identification.gap.fit.gauss_newton import fit, linearise
+from identification.gap.fit.recalibration import restarted
 from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.judge.verdict import AMBIGUOUS, UNKNOWN
 from identification.gap.plant import NuisanceParameter
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
 from identification.gap.report.gap_json import write_results
-from identification.gap.search.onset import Span, in_span, spans_of_causes
+from identification.gap.search.onset import Span, in_span, likeliest_span, spans_of_causes
 from identification.gap.search.screening import (
     CauseSignature,
     assess_separability,
@@ -126,6 +128,13 @@ def _in_its_drives(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosi
         runs, signatures, numbers, len(valve.drives), problem.readings, valve.lasting
     )
     found = diagnose(valve.acting_in(spans), seed=seed, cache=cache)
+    if found.best and len(found.best.hypothesis.labels) == 1:
+        (label,) = found.best.hypothesis.labels
+        refitted = spans | {label: _span_by_refits(valve, spans, found)}
+        if refitted[label] != replace(spans[label], probability=refitted[label].probability):
+            cache = cache.named("in its drives: ")
+            found = diagnose(valve.acting_in(refitted), seed=seed, cache=cache)
+        spans = refitted
     onsets = {label: span.onset(valve.drives) for label, span in spans.items()}
     hidden = set(found.ranking.separability.absorbed)
     return replace(
@@ -133,6 +142,32 @@ def _in_its_drives(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosi
         onsets={label: onset for label, onset in onsets.items() if onset},
         as_consumption=tuple(c for c in as_consumption(runs, signatures) if c in hidden),
     )
+
+
+def _span_by_refits(valve: "LoggedValve", spans: Mapping[str, Span], found: Diagnosis) -> Span:
+    """The likeliest drives of the best cause, which is a single one, by a fit in each of some spans.
+
+    These are all that last to the end, then those that begin with the best of them: as many as drives.
+    """
+    problem, estimate = found.ranking.problem, found.best.hypothesis.estimate  # type: ignore[union-attr]
+    (cause,) = estimate.hypothesis.causes
+    if cause.label in valve.lasting and not cause.run_parameters:
+        return spans[cause.label]  # a parameter off its value
+    count = len(valve.drives)
+    squares = dict.fromkeys(combinations(range(count + 1), 2), np.inf)
+
+    def refit(span: tuple[int, int]) -> None:
+        plant = copy(prepared(problem.plant))
+        plant.plant = valve.acting_in({**spans, cause.label: Span(*span, 1.0, False)})
+        narrowed = FittingProblem(plant, problem.slopes, thorough=problem.thorough)
+        squares[span] = fit(narrowed, [restarted(estimate)], iterations=3)[0].chi_square
+
+    for start in range(count):
+        refit((start, count))
+    first, _ = min(squares, key=lambda span: squares[span])
+    for end in range(first + 1, count):
+        refit((first, end))
+    return likeliest_span(np.array([*squares.values()]), [*squares], count, problem.readings)
 
 
 def as_consumption(
@@ -194,7 +229,7 @@ class LoggedValve(Valve):
         other.acting = {
             p.symbol: in_span(drives, spans[cause.label].first, spans[cause.label].end)
             for cause in self.causes
-            for p in cause.parameters
+            for p in (*cause.parameters, *cause.run_parameters)
             if not spans[cause.label].whole
         }
         return other

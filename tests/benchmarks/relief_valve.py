@@ -130,30 +130,47 @@ def _runge_kutta(x, v, p, q, h):
 
 
 @inlined
-def _try_steps(work, step):
-    """Take one trial step in every lane; accept it where the disc neither turns nor meets the seat.
+def begin(work, lane, q, running):
+    """Begin a trajectory with the flow q in a lane, unless running is 0."""
+    for row in range(N_ROW):
+        work[row, lane] = 0.0
+    work[X, lane], work[V, lane], work[P, lane] = START
+    work[Q, lane], work[RUNNING, lane], work[HINT, lane] = q, running, _UNLOCATED
 
-    Returns whether it does in any lane.
-    """
-    met = False
-    for lane in range(LANES):
-        x, v, p, time = work[X, lane], work[V, lane], work[P, lane], work[TIME, lane]
-        h = min(min(step, GROWTH * time + FIRST_STEP), work[HINT, lane]) * work[RUNNING, lane]
-        x1, v1, p1 = _runge_kutta(x, v, p, work[Q, lane], h)
-        meets = (v * v1 < 0.0) | (x1 < -LANDING) | ((x1 <= LANDING) & (v1 < 0.0))
-        work[X, lane] = x if meets else x1
-        work[V, lane] = v if meets else v1
-        work[P, lane] = p if meets else p1
-        work[TIME, lane] = time if meets else time + h
-        work[HINT, lane] = _UNLOCATED
-        work[X1, lane], work[V1, lane], work[P1, lane], work[H, lane] = x1, v1, p1, h
-        work[MET, lane] = 1.0 if meets else 0.0
-        met |= meets
-    return met
+
+def stepper(lanes):
+    """`try_steps` of a block of so many lanes: LLVM has to know their number."""
+
+    @inlined
+    def try_steps(work, step):
+        """Take one trial step in every lane; accept it where the disc neither turns nor meets the seat.
+
+        Returns whether it does in any lane.
+        """
+        met = False
+        for lane in range(lanes):
+            x, v, p, time = work[X, lane], work[V, lane], work[P, lane], work[TIME, lane]
+            h = min(min(step, GROWTH * time + FIRST_STEP), work[HINT, lane]) * work[RUNNING, lane]
+            x1, v1, p1 = _runge_kutta(x, v, p, work[Q, lane], h)
+            meets = (v * v1 < 0.0) | (x1 < -LANDING) | ((x1 <= LANDING) & (v1 < 0.0))
+            work[X, lane] = x if meets else x1
+            work[V, lane] = v if meets else v1
+            work[P, lane] = p if meets else p1
+            work[TIME, lane] = time if meets else time + h
+            work[HINT, lane] = _UNLOCATED
+            work[X1, lane], work[V1, lane], work[P1, lane], work[H, lane] = x1, v1, p1, h
+            work[MET, lane] = 1.0 if meets else 0.0
+            met |= meets
+        return met
+
+    return try_steps
+
+
+_try_steps = stepper(LANES)
 
 
 @numba.njit(**FLAGS)
-def _settle(work, lane, transient, impacts, maxima):
+def settle(work, lane, transient, impacts, maxima):
     """Shorten a step that passes the seat; accept any other with its extremum and its impact."""
     x, v, h = work[X, lane], work[V, lane], work[H, lane]
     x1, v1 = work[X1, lane], work[V1, lane]
@@ -189,7 +206,8 @@ def _keep_maximum(work, lane, value, transient, maxima):
         maxima[at] = value
     work[PASSED, lane] += 1.0
     if abs(value - work[LAST, lane]) < CONVERGED:
-        maxima[max(at, 0) :] = value
+        for later in range(max(at, 0), maxima.size):
+            maxima[later] = value
         work[RUNNING, lane] = 0.0
     if at == maxima.size - 1:
         work[RUNNING, lane] = 0.0
@@ -200,18 +218,15 @@ def _run(q, step, transient, impacts, maxima, passed):
     """All trajectories, block by block."""
     work = np.empty((N_ROW, LANES))
     for first in range(0, q.size, LANES):
-        work[:] = 0.0
         for lane in range(LANES):
-            work[X, lane], work[V, lane], work[P, lane] = START
-            work[Q, lane] = q[min(first + lane, q.size - 1)]
-            work[RUNNING, lane] = 1.0 if first + lane < q.size else 0.0
-            work[HINT, lane] = _UNLOCATED
+            own = first + lane
+            begin(work, lane, q[min(own, q.size - 1)], 1.0 if own < q.size else 0.0)
         for _ in range(MOST_STEPS):
             if _try_steps(work, step):
                 for lane in range(LANES):
                     if work[MET, lane] != 0.0:
                         own = first + lane
-                        _settle(work, lane, transient, impacts[own], maxima[own])
+                        settle(work, lane, transient, impacts[own], maxima[own])
                 if work[RUNNING].sum() == 0.0:
                     break
         for own in range(first, min(first + LANES, q.size)):

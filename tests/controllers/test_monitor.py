@@ -7,6 +7,8 @@ import shutil
 import subprocess
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -28,7 +30,7 @@ from epv_env.common.files import JSONFileError
 from epv_env.plant.plantfile import Plant
 from identification.recordings.log_files import Log, read_log
 from tests.training.exports import sanitisers
-from training.commands.monitor import follow, sentences
+from training.commands.monitor import agreement, follow, sentences
 from training.deploy.compiled import build
 from training.deploy.monitor_c import effects_of, sources
 from training.drives import drives, write_log
@@ -201,6 +203,37 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     assert np.isfinite(monitor.log_odds)
     log = Log(name="", temperature=293.0, pressure=1e5, period=5e-3, drives=())
     assert "Restarts because its state was not finite: 1." in sentences(monitor, log, [])
+
+
+def test_a_diagnosis_that_differs_is_explained() -> None:
+    content: dict[str, Any] = {
+        "verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None,
+        "causes": [], "levels": {"form": {}},
+    }  # fmt: skip
+    log: Any = SimpleNamespace(drives=[SimpleNamespace(file=f"drive-{k}.csv") for k in (1, 2)])
+    monitor = Monitor(white_model())
+
+    def said() -> str:
+        return agreement(monitor, log, [50.0, 100.0], content)
+
+    assert said() == "The diagnosis agrees: no_gap."
+    monitor._log[1] = 50.0
+    assert "does not name second, by which the valve differs from the start on" in said()
+    monitor._since[1] = 60.0
+    assert "does not name second, which recalibration" in said()
+    content |= {"ambiguity_set": [["second"]], "verdict": "known"}
+    assert "has second begin in drive-1.csv, not drive-2.csv" in said()
+    content["causes"] = [{"effects": ["second"], "onset": {"second (x)": {"drive": "drive-2.csv"}}}]
+    assert said() == "The diagnosis agrees: known."
+    content["ambiguity_set"] = [["first"]]
+    assert "names first, which acts in all drives" in said()
+    content |= {"absorbed": [], "onset": {"drive": "drive-2.csv"}}
+    assert "names first, where the monitor names what looks alike" in said()
+    assert "does not name second, which looks like what it names" in said()
+    content["ambiguity_set"] = [["third"]]
+    assert "names third, which hardly shows" in said()
+    content["ambiguity_set"] = []
+    assert "does not name second, since it allows for a misfit" in said()
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:

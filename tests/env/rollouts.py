@@ -60,15 +60,12 @@ def actions(identifier: str, n: int, periods: int, seed: int = 0) -> NDArray:
     return np.clip(4 * draws - 2, -1, 1).astype(np.float32)[..., None]
 
 
-AfterStep = Callable[[Any, Step], None]
-
-
 def run(
     env: Any,
     commands: NDArray,
     seed: Any = 0,
     options: dict[str, Any] | None = None,
-    after_step: AfterStep = lambda env, step: None,
+    after_step: Callable[[Any, Step], None] = lambda env, step: None,
 ) -> Rollout:
     """Reset, then step through commands (periods, n, ...)."""
     first, _ = env.reset(seed=seed, options=options)

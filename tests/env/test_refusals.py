@@ -134,7 +134,7 @@ def test_reset_comes_before_the_first_step(env, action):
     [
         (lambda: EPValveEnv().reset(options={"colour": 1}), "unknown reset option 'colour': known are"),
         (lambda: native(IDS[0], 2).reset(options={"colour": 1}), "unknown reset option 'colour': known"),
-        (lambda: EPValveEnv(render_mode="ascii"), "unknown render_mode 'ascii': use 'rgb_array' or"),
+        (lambda: EPValveEnv(render_mode=WRONG[5]), "unknown render_mode 'x': use 'rgb_array' or 'hum"),
         (lambda: native(IDS[0], 2, render_mode="rgb_array"), "does not render: use gymnasium"),
         (lambda: native(IDS[0], 2).reset(seed=[1, 2, 3]), "got 3 seeds for 2 environments: give one"),
         (lambda: native(IDS[0], 2).reset(options={"p2_bar": [6, 7, 8]}), "p2_bar lists 3 values for 2"),

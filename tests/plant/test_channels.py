@@ -57,14 +57,6 @@ def inside(sensor, n=10_001):
 
 
 @each
-def test_twelve_bits_resolve_the_range(name):
-    sensor = SENSORS[name]
-    readings = np.unique(sensor.measure(inside(sensor, 400_001), np.zeros(400_001)))
-    np.testing.assert_allclose(np.diff(readings), (sensor.high - sensor.low) / 4096, rtol=1e-6)
-    assert len(readings) in (4096, 4097)
-
-
-@each
 def test_a_reading_without_noise_is_the_nearest_step(name):
     sensor = SENSORS[name]
     error = sensor.measure(inside(sensor), np.zeros(10_001)) - inside(sensor)

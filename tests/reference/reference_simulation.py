@@ -45,10 +45,6 @@ class ReferenceRun:
     state: State
     """States at these times, each (samples,) [SI]."""
     events: list[Event]
-    evaluations: int
-    """Of the right-hand side."""
-    steps: int
-    """Of the solver."""
 
 
 def simulate_reference(
@@ -71,14 +67,12 @@ def simulate_reference(
     out = np.full((len(times), len(y)), np.nan)
     out[times <= 0] = y
     log: list[Event] = []
-    steps = 0
     for segment, border in enumerate(schedule.borders[1:]):
         t = float(schedule.borders[segment])
         automaton.inputs[:] = [field[segment] for field in schedule.inputs]
         automaton.update_modes(y)
         while t < border:
             piece = _piece(automaton, t, float(border), y, method, rtol)
-            steps += len(piece.t) - 1
             inside = (times > t) & (times <= piece.t[-1])
             if np.any(inside):
                 out[inside] = piece.sol(times[inside]).T
@@ -94,9 +88,7 @@ def simulate_reference(
                         automaton.apply_event(name, y)
                         if "lands" in name:
                             automaton.update_modes(y)
-    return ReferenceRun(
-        time=times, state=State(*out.T), events=log, evaluations=automaton.evaluations, steps=steps
-    )
+    return ReferenceRun(time=times, state=State(*out.T), events=log)
 
 
 def _piece(automaton: HybridAutomaton, start: float, end: float, y: NDArray, method: str, rtol: float):

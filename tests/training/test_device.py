@@ -14,7 +14,9 @@ import numpy as np
 import pytest
 
 pytest.importorskip("joblib")
+from controllers.base import decides_on_device
 from controllers.hysteresis import Hysteresis
+from controllers.pulse import InformedPulse
 from controllers.tuned import tuned
 from docs.examples.relay import Relay
 from docs.studies.device.study import controllers, on_cpu
@@ -23,13 +25,14 @@ from epv_env.period import rules_of
 from tests.env.test_device import compiles, simulated
 from training.evaluation import batches
 from training.evaluation.metrics import METER, count
-from training.evaluation.on_device import NOTHING, run_begun
-from training.evaluation.rollout import make_env
+from training.evaluation.on_device import run_begun
+from training.evaluation.rollout import NOTHING, make_env
 from training.rare.episodes import Episodes
 
 pytestmark = pytest.mark.training
 
 N, PERIODS, RESTART = 3, 40, 20
+OPEN: dict[str, Any] = {"open_below": 0.0, "shut_above": 0.0}
 SEEDS = [3, 4, 5]
 OPTIONS: dict[str, Any] = {
     "settling_time": 0.05, "scenario": "emergency", "drop_bar": (0.2, 0.6),
@@ -57,7 +60,7 @@ def test_every_controller_decides_on_a_simulated_device_as_on_the_cpu(tmp_path):
 
 def test_an_episode_does_not_depend_on_the_number_of_lanes(tmp_path):
     """With its own noise, which follows from each episode's key."""
-    _, _, work = on_cpu(Hysteresis(open_below=0.0, shut_above=0.0), SEEDS, 0, **OPTIONS)
+    _, _, work = on_cpu(Hysteresis(**OPEN), SEEDS, 0, **OPTIONS)
     work |= {"noise": NOTHING, "periods": 6}
     works = [work | {"lanes": lanes, "record": np.zeros((6, 2, N))} for lanes in (1, 3)]
     (one, a), (three, b) = simulated(tmp_path, run_begun, works)
@@ -116,6 +119,15 @@ def test_a_controller_of_the_host_runs_on_the_processor():
     np.testing.assert_array_equal(asked.episode_return, cpu.episode_return)
 
 
+def test_a_controller_with_an_act_of_its_own_decides_on_the_host():
+    class Shut(Hysteresis):
+        def act(self, observations):
+            return np.ones(len(observations), dtype=int)
+
+    found = map(decides_on_device, (*controllers().values(), InformedPulse(), Relay(), Shut(**OPEN)))
+    assert list(found) == [True] * len(controllers()) + [False] * 3
+
+
 def test_batches_of_a_device_are_larger_and_have_names_of_their_own():
     parts, others = (batches.in_batches(replace(part(d), episodes=300_000)) for d in ("cuda", "cpu"))
     assert len(parts) == 2 < len(others)
@@ -127,5 +139,6 @@ def test_the_study_runs_in_the_simulator(tmp_path):
     environment = {**os.environ, "NUMBA_ENABLE_CUDASIM": "1", "NUMBA_DISABLE_JIT": "1"}
     command = [sys.executable, "-m", "docs.studies.device.study", "--quick", "--out", tmp_path]
     subprocess.run(command, env=environment, check=True, timeout=600)
-    rows = json.loads((tmp_path / "figures.json").read_text())["checks"]
-    assert len(rows) == 2 + len(controllers())
+    found = json.loads((tmp_path / "figures.json").read_text())
+    assert len(found["checks"]) == 2 + len(controllers())
+    assert found["relief"][-1][-1] < 1e-5

@@ -24,7 +24,7 @@ pytestmark = [
     pytest.mark.skipif(shutil.which("cc") is None, reason="there is no C compiler (cc) here"),
 ]
 
-READINGS = 1_000_000
+READINGS = 400_000
 
 DRIVE = """
 #include <math.h>

@@ -8,7 +8,7 @@ What the monitor knows of the report's valve is shipped. Another plant is simula
 effect of the catalogue: a minute or two, once.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Annotated, Any
@@ -17,7 +17,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.monitor import RETURN, SHIPPED, Change, Monitor, MonitorModel
+from controllers.monitor import RETURN, SHIPPED, UNKNOWN, Change, Monitor, MonitorModel
 from epv_env.common.command_line import NextStep, beside
 from epv_env.common.files import decoded
 from epv_env.common.options import Folder, Number, PlantFile, Seed
@@ -67,7 +67,7 @@ def run(options: Options) -> None:
     save_figure(picture(monitor, ends), options.out / FIGURE)
     print(*sentences(monitor, log, ends), sep="\n")
     if options.gap:
-        print(agreement(monitor, decoded(options.gap, remedy="diagnose the log")))
+        print(agreement(monitor, log, ends, decoded(options.gap, remedy="diagnose the log")))
     print(f"written: {options.out / FIGURE}")
 
 
@@ -101,43 +101,70 @@ def sentences(monitor: Monitor, log: Log, ends: Sequence[float]) -> list[str]:
 
 def _sentence(change: Change, log: Log, ends: Sequence[float]) -> str:
     """When a change came, and what it is."""
-    number = min(int(np.searchsorted(ends, change.onset, side="right")), len(ends) - 1)
-    when = change.onset - (ends[number - 1] if number else 0.0)
+    file, when = _began(change, log, ends)
     causes = [f"{name} {p:.2f}" for name, p in change.causes.items() if p >= LIKELY]
     parts = [f"{name} {p:.2f}" for name, p in change.components.items() if p >= LIKELY]
     what = "The latest change is gone" if causes[0].startswith(RETURN) else "Something has changed"
     return (
-        f"{what} (probability {change.probability:.4g}), in {log.drives[number].file} at {when:.0f} s. "
+        f"{what} (probability {change.probability:.4g}), in {file} at {when:.0f} s. "
         f"Effects: {', '.join(causes)}. Components: {', '.join(parts)}."
     )
 
 
-def agreement(monitor: Monitor, content: Mapping[str, Any]) -> str:
-    """Whether the diagnosis of the same log says the same, and why not; content: of gap.json."""
+def _began(change: Change, log: Log, ends: Sequence[float]) -> tuple[str, float]:
+    """File of the drive in which a change began, and when in it [s]."""
+    number = min(int(np.searchsorted(ends, change.onset, side="right")), len(ends) - 1)
+    return log.drives[number].file, change.onset - (ends[number - 1] if number else 0.0)
+
+
+def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: Mapping[str, Any]) -> str:
+    """What the diagnosis of the same log says otherwise, and why; content: of gap.json."""
     named = {name for effects in content["ambiguity_set"] for name in effects}
-    seen = {next(iter(change.causes)) for change in monitor.changes} - {RETURN}
-    if named & seen or not (named or seen):
+    changes = {next(iter(change.causes)): change for change in reversed(monitor.changes)}
+    seen = changes.keys() - {RETURN}
+    said = [f"names {name}, {_unseen(monitor, name, seen, content)}" for name in sorted(named - seen)]
+    said += [
+        f"does not name {'a change without a name' if name == UNKNOWN else name}, "
+        f"{_unnamed(changes[name], name, named, content)}"
+        for name in sorted(seen - named)
+    ]
+    for name in sorted(named & seen):
+        own, other = _began(changes[name], log, ends)[0], _drive_with(name, content, log)
+        if own != other:
+            said.append(f"has {name} begin in {other}, not {own}: it weighs whole drives, not openings")
+    if not said:
         return f"The diagnosis agrees: {content['verdict']}."
-    listed, both = ", ".join(sorted(named or seen)), bool(named and seen)
-    absorbed = {label.split(" ")[0] for label in content["absorbed"]}
-    if both:
-        why = "it simulates every effect and its law, the monitor compares openings with usual sizes"
-    elif seen and all(change.onset < START for change in monitor.changes):
-        why = "the valve differs from the start on, and there the four parameters are refitted"
-    elif seen and seen <= absorbed:
-        why = "this effect is absorbed there, by recalibration or the unknown consumption"
-    elif seen:
-        why = (
-            "it allows for a misfit that no model is free of, the monitor compares the valve with itself"
-        )
-    elif not named & set(monitor.model.effects):
-        why = "this effect hardly shows in the features of an opening, which the monitor reads"
-    elif not content["onset"]:
-        why = "the effect acts in all drives, and the monitor takes it for the valve's own offset"
-    else:
-        why = "at the stated rate of false alarms the monitor needs a larger effect, or more openings"
-    missed = f"names {listed}" if named else f"does not see {listed} ({content['verdict']})"
-    return f"The diagnosis {missed}: {why}."
+    return f"The diagnosis ({content['verdict']}) {'; it '.join(said)}."
+
+
+def _unseen(monitor: Monitor, name: str, seen: Collection[str], content: Mapping[str, Any]) -> str:
+    """Why the monitor has not told an effect."""
+    hidden = any(f"{name} (p2)" in label for label in content["levels"]["form"])
+    if name not in monitor.model.effects or hidden:
+        return "which hardly shows in the features of an opening, which the monitor reads"
+    if not content["onset"]:
+        return "which acts in all drives, and the monitor takes it for the valve's own offset"
+    if seen:
+        return "where the monitor names what looks alike: it knows effects of usual size only"
+    return "for which the monitor needs more openings, or a larger effect, at the stated false alarms"
+
+
+def _unnamed(change: Change, name: str, named: Collection[str], content: Mapping[str, Any]) -> str:
+    """Why the diagnosis has not named what the monitor tells."""
+    if change.onset < START:
+        return "by which the valve differs from the start on: there the four parameters are refitted"
+    if name in {label.split(" ")[0] for label in content["absorbed"]}:
+        return "which recalibration or the unknown consumption absorbs"
+    if named:
+        return "which looks like what it names: it simulates every effect and its law"
+    return "since it allows for a misfit that no model is free of; the monitor compares openings alone"
+
+
+def _drive_with(name: str, content: Mapping[str, Any], log: Log) -> str:
+    """File of the first drive with an effect, according to gap.json."""
+    onsets = [o for c in content["causes"] for o in c["onset"].items() if name in c["effects"]]
+    first = log.drives[0].file
+    return next((own["drive"] for label, own in onsets if label.split(" ")[0] == name), first)
 
 
 def picture(monitor: Monitor, ends: list[float]) -> Figure:

@@ -18,14 +18,12 @@ from epv_env.period import rules_of
 from epv_env.settings import Settings
 from epv_env.signals import OptionError
 from training.evaluation.metrics import METER, EpisodeMetrics, count
-from training.evaluation.rollout import begin_episodes, make_env
+from training.evaluation.rollout import NEVER, NOTHING, begin_episodes, make_env
 
 LANES = 262_144
 """Most threads of a launch: more than an accelerator of today runs at a time."""
 DRAWN_AT_ONCE = 4096
 """Starts that a process draws: half a second's work."""
-NEVER, NOTHING = -1, np.empty((0, 0, 0))
-"""Instead of a period before which the control unit restarts, and of arrays."""
 
 
 def run_begun(

@@ -2,7 +2,7 @@
 
 import gc
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
@@ -15,6 +15,8 @@ from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import METER, EpisodeMetrics, count_all
 from training.evaluation.seeds import TIMING_SEED
 
+NEVER, NOTHING = -1, np.empty((0, 0, 0))
+"""Instead of a period before which the control unit restarts, and of arrays."""
 WARM_UP_DECISIONS = 50
 """Decisions whose time is not counted."""
 
@@ -55,6 +57,39 @@ def begin_episodes(
     return observation
 
 
+def run_begun(
+    env: EPValveVectorEnv | EPValvePWMVectorEnv,
+    controller: Controller,
+    observation: NDArray,
+    *,
+    periods: int,
+    restart: int = NEVER,
+    record: NDArray = NOTHING,
+) -> NDArray:
+    """Run episodes that have begun with an observation (n, entries); returns records of METER (n,).
+
+    An episode whose circuit empties violates the constraint (C1) and ends there: the failure is charged
+    once and nothing later counts. Its valve runs on unseen, since the batch runs as one.
+
+    restart: period before which the control unit restarts, so that the controller forgets everything; a
+    privileged one remembers. record: filled with actions and p2 [Pa], (periods, 2, n).
+    """
+    own: Any = env.unwrapped
+    settings, meters = own.settings, np.zeros(len(observation), METER)
+    for k in range(periods):
+        if k == restart and not isinstance(controller, Privileged):
+            controller.reset(len(meters))
+        actions = controller.act(observation)
+        result = env.advance(actions)
+        observation = result.observation
+        count_all(
+            meters, result.figures, env.coil_energy, settings.control_period, settings.settling_time
+        )
+        if len(record):
+            record[k] = actions, own.task.valves.state.p2
+    return meters
+
+
 def run_episodes(
     controller: Controller,
     *,
@@ -62,39 +97,21 @@ def run_episodes(
     duration: float,
     options: dict[str, Any],
     restart_s: float | None = None,
-    progress: Callable[[float], None] = lambda share: None,
 ) -> EpisodeMetrics:
-    """Run one episode per seed; returns their metrics.
-
-    An episode whose circuit empties violates the constraint (C1) and ends there: the failure is charged
-    once and nothing later counts. Its valve runs on unseen, since the batch runs as one.
+    """Run one episode per seed, as `run_begun` does; returns their metrics.
 
     Args:
         controller: decides for all episodes.
         seeds: of the episodes.
         duration: of each episode [s].
         options: of the environment.
-        restart_s: when the control unit restarts, so that the controller forgets everything, and the
-            plant goes on [s]; a privileged controller remembers. None: never.
-        progress: called with the share done [1].
+        restart_s: when the control unit restarts, and the plant goes on [s]; None: never.
     """
     env = make_env(controller, len(seeds), **options)
-    observation = begin_episodes(env, controller, seeds)
-    own: Any = env.unwrapped
-    period = own.settings.control_period
-    steps = round(duration / period)
-    meters = np.zeros(len(seeds), METER)
-    restart = None if restart_s is None else round(restart_s / period)
-    for step in range(steps):
-        if step == restart and not isinstance(controller, Privileged):
-            controller.reset(len(seeds))
-        action = controller.act(observation)
-        result = env.advance(action)
-        observation = result.observation
-        count_all(meters, result.figures, env.coil_energy, period, own.settings.settling_time)
-        if step % 50 == 0:
-            progress(step / steps)
-    progress(1.0)
+    observation, period = begin_episodes(env, controller, seeds), env.settings.control_period
+    restart = NEVER if restart_s is None else round(restart_s / period)
+    periods = round(duration / period)
+    meters = run_begun(env, controller, observation, periods=periods, restart=restart)
     return EpisodeMetrics.of(meters, period)
 
 

@@ -19,10 +19,8 @@ from epv_env.common.units import BAR
 from epv_env.episode import Start
 from epv_env.period import NOISE_BLOCK
 from epv_env.plant.channels import MEASURED
-from epv_env.result import DEVIATION
 from epv_env.settings import Settings
-from epv_env.task import LimitingTask
-from training.evaluation.rollout import make_env
+from training.evaluation.rollout import make_env, run_begun
 from training.rare.splitting import Moves
 
 PLANT, DISTURBANCE = 128, 1024
@@ -100,34 +98,23 @@ class Episodes:
     def worst(self, normals: NDArray) -> NDArray:
         """Largest |p2 - target| of each episode after the settling time, (n,) [bar].
 
-        Infinite if the circuit empties.
+        Infinite if the circuit empties. Raises OptionError for a controller that a device cannot run.
         """
         env = make_env(self.controller, len(normals), threads=1, **self.options)
         observation = env.task.begin_from(np.arange(len(normals)), self.starts(normals))
-        if self.device != "cpu":
-            return self._worst_on_device(env.task, normals)
         controller: Any = deepcopy(self.controller)
-        controller.reset(len(normals))
-        if isinstance(controller, Privileged):
-            controller.watch(env.task)
-        period, worst = env.settings.control_period, np.zeros(len(normals))
-        for step in range(1, round(self.duration / period) + 1):
-            result = env.advance(controller.act(observation))
-            observation = result.observation
-            if step * period > env.settings.settling_time:
-                worst = np.maximum(worst, np.abs(result.figures[DEVIATION]))
-            worst[result.failed] = np.inf
-        return worst
+        periods = round(self.duration / env.task.period)
+        if self.device == "cpu":
+            controller.reset(len(normals))
+            if isinstance(controller, Privileged):
+                controller.watch(env.task)
+            m = run_begun(env, controller, observation, periods=periods)
+        else:
+            from training.evaluation import on_device  # compiles for an accelerator: of no use elsewhere
 
-    def _worst_on_device(self, task: LimitingTask, normals: NDArray) -> NDArray:
-        """`worst` of episodes that have begun. Raises OptionError for a controller of the host."""
-        from training.evaluation import on_device  # compiles for an accelerator: of no use elsewhere
-
-        noise = normals[:, PLANT + DISTURBANCE :].reshape(len(normals), -1, len(MEASURED))
-        m = on_device.run_begun(
-            self.controller, on_device.Batch.of(task), task.settings,
-            periods=round(self.duration / task.period), noise=noise,
-        )  # fmt: skip
+            begun, noise = on_device.Batch.of(env.task), normals[:, PLANT + DISTURBANCE :]
+            noise = noise.reshape(len(normals), -1, len(MEASURED))
+            m = on_device.run_begun(controller, begun, env.settings, periods=periods, noise=noise)
         return np.where(m["failed"] > 0, np.inf, m["excursion"])
 
     def described(self, normals: NDArray) -> list[dict[str, Any]]:

@@ -33,9 +33,12 @@ from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.files import write_text
 from epv_env.device.kernels import P2, Batch
 from epv_env.device.vector_env import SIMULATED
-from training.evaluation.metrics import METER, count_all
-from training.evaluation.on_device import NEVER, run_begun
-from training.evaluation.rollout import begin_episodes, make_env
+from tests.benchmarks.relief_device import run_device
+from tests.benchmarks.relief_peers import run_scipy
+from tests.benchmarks.relief_valve import Task, flows
+from training.evaluation import rollout
+from training.evaluation.on_device import run_begun
+from training.evaluation.rollout import NEVER, begin_episodes, make_env
 
 FOLDER = Path(__file__).parent
 WITHIN_MBAR = 1e-6
@@ -77,24 +80,16 @@ def on_cpu(
     controller: Any, seeds: Sequence[int], periods: int, restart: int = NEVER, **options: Any
 ) -> tuple[NDArray, NDArray, dict[str, Any]]:
     """Episodes under a controller: decisions and p2 [Pa], (periods, 2, n), what is counted, and the
-    arguments of `run_begun` for the same episodes."""
+    arguments of `on_device.run_begun` for the same episodes."""
     env: Any = make_env(controller, len(seeds), **options)
-    seen, settings = begin_episodes(env, controller, seeds), env.settings
+    seen, task = begin_episodes(env, controller, seeds), env.task
     arguments = {
-        "controller": controller, "settings": settings, "begun": deepcopy(Batch.of(env.task)),
-        "noise": env.task._noise.copy(),
+        "controller": controller, "settings": env.settings, "begun": deepcopy(Batch.of(task)),
+        "noise": task._noise.copy(),
     }  # fmt: skip
-    record, meters = np.empty((periods, 2, len(seeds))), np.zeros(len(seeds), METER)
-    for k in range(periods):
-        if k == restart:
-            controller.reset(len(seeds))
-        record[k, 0] = controller.act(seen)
-        result = env.advance(record[k, 0])
-        seen, record[k, 1] = result.observation, env.task.valves.state.p2
-        count_all(
-            meters, result.figures, env.coil_energy, settings.control_period, settings.settling_time
-        )
-    return record, meters, arguments
+    record = np.empty((periods, 2, len(seeds)))
+    counted = rollout.run_begun(env, controller, seen, periods=periods, restart=restart, record=record)
+    return record, counted, arguments
 
 
 def on_host(n: int, periods: int) -> dict[str, Any]:
@@ -200,7 +195,22 @@ def sweep(quick: bool) -> list[list[Any]]:
         return []
     with TemporaryDirectory() as folder:
         command = f"{sys.executable} -m training.{SWEEP}{folder}/out"
+        command += f" > {os.devnull}"  # its next command is about this folder
         return [[SWEEP, seconds(lambda: subprocess.run(command, shell=True, check=True))]]
+
+
+def relief(quick: bool) -> list[list[Any]]:
+    """The relief valve of arXiv 2011.01740, by step: maxima of the lift a second, and their error.
+
+    The error is that of the first ones, before chaos has enlarged any difference.
+    """
+    first, many = Task(flows=flows(8), transient=4, recorded=8), Task(flows=flows(30_720))
+    true, rows = run_scipy(first, "DOP853", 1e-12)[0], []
+    for step in (2e-2, 5e-3):
+        error = run_device(first, step)[0].error(true)  # compiles
+        found, took = run_device(first if quick else many, step)
+        rows.append([step, float(found.passed.sum() / took), error])
+    return rows
 
 
 PARTS: dict[str, tuple[Callable[[bool], list[list[Any]]], list[str]]] = {
@@ -208,6 +218,7 @@ PARTS: dict[str, tuple[Callable[[bool], list[list[Any]]], list[str]]] = {
     "steps": (steps, ["valves", "actions", "step [ms]", "simulated seconds a second"]),
     "episodes": (episodes, ["controller", "episodes", "simulated seconds a second"]),
     "sweep": (sweep, ["command", "time [s]"]),
+    "relief": (relief, ["step", "maxima a second", "error"]),
 }
 """What finds the rows of a table, and its headings, in the order in which they run."""
 
@@ -228,7 +239,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         find, headings = PARTS[name]
         known |= {"device": str(device), name: find(options.quick)}
         write_text(path, json.dumps(known, indent=1) + "\n")
-        rows = [[f"{x:,.3g}" if isinstance(x, float) else str(x) for x in row] for row in known[name]]
+        rows = [[f"{x:,.4g}" if isinstance(x, float) else str(x) for x in row] for row in known[name]]
         fill(options.out / PAGE, {"device": f"Measured on: {device}.", name: table(headings, rows)})
     return 0
 

@@ -76,31 +76,32 @@ def log_drives(valve: dict[str, Any], folder: Path) -> None:
     plant = replace(plant, parameters=plant.parameters.replace(**valve["parameters"]))
     write_log(
         folder, policy, plant, valve["seeds"], duration=DURATION, effects=valve["effects"],
-        onset=valve["onset"], begun=lambda valves: deviate(valves, valve["deviation"]),
+        onset=valve["onset"], begun=lambda valves: deviate(valves, [valve["deviation"]]),
     )  # fmt: skip
 
 
-def deviate(valves: Valves, deviation: float) -> None:
-    """Have the sizes of a valve's effects depend on its state, as in docs/studies/blind/forms.py."""
+def deviate(valves: Valves, deviations: Sequence[float]) -> None:
+    """Have the sizes of each valve's effects depend on its state, as in docs/studies/blind/forms.py."""
     tables = valves.tables
-    fitted = tables.effects.copy()
+    fitted, by = tables.effects.copy(), np.array(deviations)
 
     def in_parts(duration: ArrayLike) -> None:
         inputs = np.array(valves.inputs)
         for _ in range(PARTS):
-            set_sizes(tables.state, inputs, tables.coefficients, tables.effects, fitted, deviation)
+            set_sizes(tables.state, inputs, tables.coefficients, tables.effects, fitted, by)
             Valves.advance(valves, np.asarray(duration) / PARTS)
 
     valves.advance = in_parts
 
 
 @numba.njit
-def set_sizes(state, inputs, coefficients, effects, fitted, d):
-    """Write the sizes at a valve's state into its table `effects`."""
-    q, u = state_at(state, 0, 0), inputs_at(inputs, 0, 0)
-    sizes = deviating_sizes(q, u, coefficients_at(coefficients, 0, 0), effects_at(fitted, 0, 0), d)
-    for row in range(len(sizes)):
-        effects[row, 0] = sizes[row]
+def set_sizes(state, inputs, coefficients, effects, fitted, deviations):
+    """Write the sizes at the valves' states into their table `effects`; deviations: (valves,) [1]."""
+    for i, d in enumerate(deviations):
+        q, u = state_at(state, 0, i), inputs_at(inputs, 0, i)
+        sizes = deviating_sizes(q, u, coefficients_at(coefficients, 0, i), effects_at(fitted, 0, i), d)
+        for row in range(len(sizes)):
+            effects[row, i] = sizes[row]
 
 
 def answer(valve: dict[str, Any], folder: Path) -> dict[str, Any]:
@@ -159,13 +160,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--valves", type=COUNT, default=VALVES)
     options = study_options(parser, arguments)
     numbers, drives = ([2], QUICK) if options.quick else (range(options.valves), DRIVES)
-    journal = Journal(options.out / "valves.jsonl", {"seed": SEED, "drives": drives})
+    subject = {"seed": SEED, "drives": drives, "effects": [effect.name for effect in EFFECTS]}
+    journal, answers = Journal(options.out / "valves.jsonl", subject), []
     for number in numbers:
         if str(number) not in journal:
             journal.add(str(number), answer(drawn(number, drives), options.work / str(number)))
             print(number, journal[str(number)], flush=True)
-    answers = [journal[str(number)] for number in numbers]
-    fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
+        answers.append(journal[str(number)])
+        fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
     return 0
 
 

@@ -1,13 +1,13 @@
 """Leaks: seats of magnet and protection valve that do not close, and the circuit."""
 
-from epv_env.plant.effects.record import Effect, Size
+from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.primitives import inlined
 
 INLET_SEAT_LEAK = Effect(
     name="inlet_seat_leak",
     component="control_chamber",
     strength=("leak_inlet",),
-    form="effective area of the seat from A, shut, to the bore's",
+    form="effective area of the seat from A, shut, to the bore's and w A",
     source="seat leakage, up to a tenth of the bores",
     sizes=(
         Size(
@@ -19,14 +19,22 @@ INLET_SEAT_LEAK = Effect(
             trials=(4e-9,),
             drawn=(2e-9, 2e-8),
         ),
+        Size(
+            symbol="wA_in",
+            unit="1",
+            domain=(0, 1),
+            meaning="share of this leak beside the seat: it goes on while the seat is open",
+            spread=0.5,
+        ),
     ),
+    constants=(Constant("beside_inlet", lambda p: p["wA_in"], is_size=False),),
 )
 
 EXHAUST_SEAT_LEAK = Effect(
     name="exhaust_seat_leak",
     component="control_chamber",
     strength=("leak_exhaust",),
-    form="effective area of the seat from A, shut, to the bore's",
+    form="effective area of the seat from A, shut, to the bore's and w A",
     source="seat leakage, up to a tenth of the bores",
     sizes=(
         Size(
@@ -38,7 +46,15 @@ EXHAUST_SEAT_LEAK = Effect(
             trials=(4e-9,),
             drawn=(2e-9, 2e-8),
         ),
+        Size(
+            symbol="wA_exh",
+            unit="1",
+            domain=(0, 1),
+            meaning="share of this leak beside the seat: it goes on while the seat is open",
+            spread=0.5,
+        ),
     ),
+    constants=(Constant("beside_exhaust", lambda p: p["wA_exh"], is_size=False),),
 )
 
 SEAT_LEAK = Effect(
@@ -81,6 +97,9 @@ CIRCUIT_LEAK = Effect(
 
 
 @inlined
-def opened(area, bore, leak):
-    """Effective area of a MV seat that does not close fully [m^2]: from the leak, shut, to the bore."""
-    return area + leak * (1.0 - area / bore)
+def opened(area, bore, leak, beside):
+    """Effective area of a MV seat that does not close fully [m^2].
+
+    The open seat takes the leak over, up to the bore's area, but for the share `beside` of it [-].
+    """
+    return area + leak * (1.0 - (1.0 - beside) * (area / bore))

@@ -107,16 +107,24 @@ def _likeliest(
 ) -> dict[str, Span]:
     """The likeliest span of each cause; squares: (signatures, spans), count: of drives."""
     labels = [signature.cause.label for signature in signatures]
+    return {
+        label: likeliest_span(
+            np.min(squares[[name == label for name in labels]], axis=0), spans, count, readings
+        )
+        for label in dict.fromkeys(labels)
+    }
+
+
+def likeliest_span(
+    squares: NDArray, spans: Sequence[tuple[int, int]], count: int, readings: int
+) -> Span:
+    """The likeliest of the spans (first, end); squares: sum that a cause leaves in each, (spans,)."""
     kinds = ["whole" if s == (0, count) else "late" if s[1] == count else "mended" for s in spans]
     prior = np.array([np.log(KINDS[kind] / kinds.count(kind)) for kind in kinds])
-    likeliest = {}
-    for label in dict.fromkeys(labels):
-        least = np.min(squares[[name == label for name in labels]], axis=0)
-        misfits = (least / np.min(least) - 1.0) * readings / 2.0
-        chances = softmax(log_likelihoods(misfits, readings) + prior)
-        best = int(np.argmax(chances))
-        likeliest[label] = Span(*spans[best], float(chances[best]), kinds[best] == "whole")
-    return likeliest
+    misfits = (squares / np.min(squares) - 1.0) * readings / 2.0
+    chances = softmax(log_likelihoods(misfits, readings) + prior)
+    best = int(np.argmax(chances))
+    return Span(*spans[best], float(chances[best]), kinds[best] == "whole")
 
 
 def least_squares_by_span(

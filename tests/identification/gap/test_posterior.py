@@ -91,13 +91,3 @@ def test_sets_of_as_many_causes_share_a_prior_and_an_open_law_costs_its_choice()
     opened = replace(sets[1], estimate=lawful, law_penalty=0.7)
     found_prior = np.exp(log_priors(problem, [opened])[1])
     assert found_prior == pytest.approx(shared[1] * np.exp(-0.7) / 2.0)
-
-
-def test_a_cause_that_removes_more_has_less_misfit():
-    found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
-    left = {frozenset(e.labels): m for e, m in zip(found.hypotheses, found.misfits, strict=True)}
-    tolerated = tolerated_misfit(sum(own.readings for own in found.noise))
-    assert left[frozenset({"dead_zone", "lag", "coupling"})] < tolerated
-    assert left[frozenset({"lag", "coupling"})] > 10 * tolerated
-    misfits = [misfit_beyond_noise(each, found.noise) for each in found.hypotheses]
-    assert np.diff(found.misfits) == pytest.approx(np.diff(misfits))

@@ -2,12 +2,10 @@
 
 import json
 import re
-from typing import Any
 
 import numpy as np
 import pytest
 
-from identification.importing.binary_files import ALL_INVALID
 from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
@@ -82,12 +80,6 @@ def test_all_names_of_two_groups_are_in_one_mapping(true, tmp_path):
     np.testing.assert_allclose(made.recordings[0].p2, true.p2, rtol=0, atol=1e-6)
 
 
-def test_a_matrix_without_names_needs_its_times_in_the_mapping(true, tmp_path):
-    path = mat5(tmp_path / "run", {"ans": [values for values, _ in columns_of(true).values()]})
-    with pytest.raises(ImportingError, match=r'"time": \{"source": "NAME", "unit": "s"\}'):
-        read_files([path], ambient_bar=1.0)
-
-
 def test_one_name_in_two_groups_is_chosen_by_its_group(true, tmp_path):
     path = mdf_groups(tmp_path / "run", true, second=4)
     with pytest.raises(ImportingError, match="p2 may be 'group 0/p2' or 'group 1/p2'"):
@@ -96,20 +88,6 @@ def test_one_name_in_two_groups_is_chosen_by_its_group(true, tmp_path):
         mapping = MappingFile(channels={"p2": ChannelEntry(source=f"group {group}/p2")})
         made = read_files([path], mapping=mapping, ambient_bar=1.0).campaign.recordings[0]
         assert made.period == period
-
-
-def test_what_holds_no_numbers_does_not_stand_in_the_way(true, tmp_path):
-    from asammdf import MDF, Signal
-
-    path = mdf_groups(tmp_path / "run", true)
-    with MDF(path) as file:
-        file.append([Signal(samples=np.empty(0), timestamps=np.empty(0), name="p2", unit="bar")])
-        file.append([Signal(samples=true.p2, timestamps=true.time, name="p3", unit="bar")])
-        channels: Any = file.groups[-1].channels
-        channels[-1].flags |= ALL_INVALID
-        file.save(path.with_stem("run2"), overwrite=True)
-    path = path.with_stem("run2")
-    assert read_files([path], ambient_bar=1.0).campaign.recordings[0].period == true.period
 
 
 def test_units_alone_are_a_mapping_and_the_error_shows_it(true, tmp_path):

@@ -146,13 +146,6 @@ def test_a_sine_has_its_closed_forms():
     assert statistics.skewness == pytest.approx(0.0, abs=1e-9)
 
 
-def test_a_signal_that_never_changes_has_no_shape():
-    statistics = descriptive_statistics(np.zeros(1000), greatest=1.0)
-    assert statistics.standard_deviation == 0.0
-    assert np.isinf(statistics.signal_to_noise)
-    assert np.isnan([statistics.outlier_factor, statistics.kurtosis, statistics.skewness]).all()
-
-
 def test_runs():
     coin = np.random.default_rng(0).integers(2, size=10_000)
     assert longest_run(np.array([1, 0, 0, 1, 1, 1, 0], dtype=bool)) == (3, 3)

@@ -1,1 +1,0 @@
-"""Recordings: reading, writing, refusing."""

@@ -64,16 +64,29 @@ def test_openings_begin_steady_and_know_the_leak(tmp_path):
         assert start_of(recording.name) > 0.0
 
 
-def test_a_cause_acts_from_its_drive_on(healthy):
+def test_openings_begin_with_the_control_chamber_settled(tmp_path):
+    env = OperationLog(gymnasium.make("EPValve-v0", scenario="none", p2_bar=8.0), tmp_path / "log")
+    env.reset(seed=1)
+    for coil in np.concatenate([np.repeat([0, 1], [10, rest]) for rest in range(20, 50)]):
+        env.step(int(coil))
+    env.close()
+    campaign, _ = openings(read_log(tmp_path / "log"), PLANT.parameters)
+    assert len(campaign.recordings) > 10
+    for recording in campaign.recordings:
+        assert abs(recording.p3[0] - np.mean(recording.p1[:8])) < 4e3  # four standard deviations
+
+
+@pytest.mark.parametrize(("symbol", "size"), [("G_eddy", 0.004), ("theta_coil", 20.0)])
+def test_a_cause_acts_from_its_drive_on(symbol, size, healthy):
     log = read_log(healthy)
     campaign, steady = steady_openings(log, PLANT)
     whole = LoggedValve(campaign, PLANT, steady)
     late = whole.acting_in({c.label: Span(1, 2, 1.0, False) for c in whole.causes})
     runs = range(len(whole.runs))
-    acting = {"G_eddy": np.array([0.004])}
+    acting = {symbol: np.array([size])}
     none, every, second = (
         plant.outputs(values, runs)
-        for plant, values in ((whole, {"G_eddy": np.zeros(1)}), (whole, acting), (late, acting))
+        for plant, values in ((whole, {symbol: np.zeros(1)}), (whole, acting), (late, acting))
     )
     for run, without, both, one in zip(whole.runs, none, every, second, strict=True):
         np.testing.assert_array_equal(one, both if run.name.startswith("drive-2") else without)
@@ -230,6 +243,20 @@ def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tm
     (tmp_path / "log.json").write_text((often_opened / "log.json").read_text())
     (tmp_path / "drive-1.csv").write_text(change((often_opened / "drive-1.csv").read_text()))
     with pytest.raises(CampaignError, match=told):
+        read_log(tmp_path)
+
+
+def test_a_sensor_that_fails_on_the_way_is_left_to_the_diagnosis(often_opened, tmp_path):
+    """A current of 0.1 A without a voltage: from the second drive on a fault, in all drives refused."""
+    text, offset = (often_opened / "drive-1.csv").read_text(), scaled("I_A", 1.0, 0.1)
+    content = json.loads((often_opened / "log.json").read_text())
+    content["drives"] = [{"file": name} for name in ("drive-1.csv", "drive-2.csv")]
+    (tmp_path / "log.json").write_text(json.dumps(content))
+    (tmp_path / "drive-1.csv").write_text(text)
+    (tmp_path / "drive-2.csv").write_text(offset(text))
+    assert len(read_log(tmp_path).drives) == 2
+    (tmp_path / "drive-1.csv").write_text(offset(text))
+    with pytest.raises(CampaignError, match=r"drive-1.csv, line .*A flows while the coil is off"):
         read_log(tmp_path)
 
 

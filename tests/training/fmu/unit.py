@@ -127,7 +127,3 @@ class Instance:
             "DeSerializeFMUstate", content, ctypes.c_size_t(len(content)), ctypes.byref(state)
         )
         return state if status == OK else None
-
-    def free(self) -> None:
-        """End the instance."""
-        self.unit.function("FreeInstance")(ctypes.c_void_p(self.handle))
