@@ -3,7 +3,6 @@
 The API reference has one page for each folder of modules.
 """
 
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -56,13 +55,6 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
         if line in markdown:
             markdown = markdown.replace(line, write())
     return markdown
-
-
-def on_page_content(html: str, **_: Any) -> str:
-    """Make each picture a link to its file, which the browser shows in full size."""
-    return re.sub(
-        r'<img [^>]*src="([^"]+)"[^>]*>', r'<a href="\1" title="show in full size">\g<0></a>', html
-    )
 
 
 def _modules(package: Path) -> list[Path]:
