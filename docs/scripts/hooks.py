@@ -29,16 +29,14 @@ GENERATED = {
     "<!-- generated: effects -->": effects_table.effects_table,
 }
 """Lines of pages, and what writes the text that replaces them."""
-API = "API"
-"""The entry of the navigation that holds the generated API pages."""
 
 
 def on_config(config: Any) -> Any:
     """Put the API pages into the navigation."""
     for entry in config.nav:
         for part in entry.get("Reference", []):
-            if API in part:
-                part[API] = api_navigation()
+            if "API" in part:
+                part["API"] = api_navigation()
     return config
 
 
