@@ -82,12 +82,17 @@ def command(title: str, plant_of: Callable[[Path], OdePlant]) -> int:
     parser.add_argument("--seed", type=int, default=0, help="of resampling")
     chosen = parser.parse_args()
     diagnosis = diagnose(plant_of(chosen.data), seed=chosen.seed)
-    write_results(diagnosis, chosen.out)
-    heading = f"Gap between model and recordings: {title}"
-    write_page(chosen.out / "report.html", title=heading, sections=sections(diagnosis))
-    print(verdict_sentence(diagnosis)[1])
+    write_down(diagnosis, chosen.out, title)
     print(held_out_errors(diagnosis))
     return 0
+
+
+def write_down(diagnosis: Diagnosis, out: Path, title: str) -> None:
+    """Write gap.json and report.html, and print the verdict."""
+    write_results(diagnosis, out)
+    heading = f"Gap between model and recordings: {title}"
+    write_page(out / "report.html", title=heading, sections=sections(diagnosis))
+    print(verdict_sentence(diagnosis)[1])
 
 
 def held_out_errors(diagnosis: Diagnosis) -> str:

@@ -14,11 +14,11 @@ from copy import copy
 import numpy as np
 from numpy.typing import NDArray
 
+from docs.examples.recorded_plants import cause, write_down
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.options import writable_folder
 from identification.gap.diagnosis import diagnose
 from identification.gap.plant import (
-    Cause,
     Channel,
     FreeParameter,
     NuisanceParameter,
@@ -26,10 +26,6 @@ from identification.gap.plant import (
     StateEquation,
     StateTrace,
 )
-from identification.gap.report.gap_json import write_results
-from identification.gap.report.page import sections
-from identification.gap.report.sentences import verdict_sentence
-from identification.report.page import write_page
 
 AREA = 0.5
 """Cross-section of the tank [m^2]."""
@@ -126,9 +122,9 @@ class Tank:
             FreeParameter(symbol="c", unit="m/s", low=0.001, high=0.1, nominal=NOMINAL["c"], scale=0.02),
         )
         self.causes = (
-            _cause("leak", "tank", "1/s", trial=1e-3, high=0.05),
-            _cause("lag", "sensor", "s", trial=2.0, high=30.0),
-            _cause("evaporation", "tank", "m/s", trial=1e-4, high=1e-2),
+            cause("leak", "tank", "1/s", (1e-3,), (0.0, 0.05)),
+            cause("lag", "sensor", "s", (2.0,), (0.0, 30.0)),
+            cause("evaporation", "tank", "m/s", (1e-4,), (0.0, 1e-2)),
         )
         self.tolerances = ()
         self.run_offsets = (
@@ -178,12 +174,6 @@ class Tank:
         return self.runs[run].inputs["q"], float(self.runs[run].time[1] - self.runs[run].time[0])
 
 
-def _cause(name: str, component: str, unit: str, *, trial: float, high: float) -> Cause:
-    """A cause with one parameter of the same name, which is 0 in the nominal model."""
-    parameter = FreeParameter(symbol=name, unit=unit, low=0.0, high=high, trials=(trial,), scale=trial)
-    return Cause(name=name, component=component, parameters=(parameter,))
-
-
 LEAKING = {"c": 0.021, "leak": 4e-3}
 """The virtual tank."""
 
@@ -195,10 +185,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=0, help="of resampling, and of the virtual noise")
     chosen = parser.parse_args()
     diagnosis = diagnose(Tank(virtual_recordings(LEAKING, chosen.seed)), seed=chosen.seed)
-    write_results(diagnosis, chosen.out)
-    title = "Gap between model and recordings: a tank"
-    write_page(chosen.out / "report.html", title=title, sections=sections(diagnosis))
-    print(verdict_sentence(diagnosis)[1])
+    write_down(diagnosis, chosen.out, "a tank")
     return 0
 
 

@@ -9,9 +9,6 @@ from epv_env.common.commands import commands, help_line
 from epv_env.common.options import SHOWN_DEFAULT, parser_of
 from training.epv import PACKAGES
 
-WIDTH = "88"
-"""Characters in a line of usage."""
-
 
 def page() -> str:
     """All command lines as Markdown."""
@@ -21,7 +18,7 @@ def page() -> str:
 def _section(name: str, module: str) -> str:
     """Heading, meaning, usage and a table of the options."""
     parser = parser_of(importlib.import_module(module), f"epv {name}")
-    with patch.dict(os.environ, {"COLUMNS": WIDTH, "NO_COLOR": "1"}):
+    with patch.dict(os.environ, {"COLUMNS": "88", "NO_COLOR": "1"}):
         usage = parser.format_usage()
     rows = [_row(action) for action in parser._actions if action.dest != "help"]
     table = "\n".join(("| Option | Default | Meaning |", "|---|---|---|", *rows))

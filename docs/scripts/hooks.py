@@ -3,7 +3,6 @@
 The API reference has one page for each folder of modules.
 """
 
-import re
 import sys
 from pathlib import Path
 from typing import Any
@@ -30,16 +29,14 @@ GENERATED = {
     "<!-- generated: effects -->": effects_table.effects_table,
 }
 """Lines of pages, and what writes the text that replaces them."""
-API = "API"
-"""The entry of the navigation that holds the generated API pages."""
 
 
 def on_config(config: Any) -> Any:
     """Put the API pages into the navigation."""
     for entry in config.nav:
         for part in entry.get("Reference", []):
-            if API in part:
-                part[API] = api_navigation()
+            if "API" in part:
+                part["API"] = api_navigation()
     return config
 
 
@@ -56,28 +53,6 @@ def on_page_markdown(markdown: str, **_: Any) -> str:
         if line in markdown:
             markdown = markdown.replace(line, write())
     return markdown
-
-
-def on_page_content(html: str, **_: Any) -> str:
-    """Make each picture a link to its file, which the browser shows in full size."""
-    return re.sub(
-        r'<img [^>]*src="([^"]+)"[^>]*>', r'<a href="\1" title="show in full size">\g<0></a>', html
-    )
-
-
-NARROWER = {"76.25em": "72em", "76.234375em": "71.984375em"}
-"""Widths from which the theme shows the menu beside the page: by ours, a window of 1200 px does."""
-
-
-def on_post_build(config: Any) -> None:
-    """Show the menu on narrower screens."""
-    for folder in ("stylesheets", "javascripts"):
-        for path in Path(config.site_dir, "assets", folder).glob("*.min.*"):
-            if path.suffix in (".css", ".js"):
-                text = path.read_text("utf-8")
-                for old, new in NARROWER.items():
-                    text = text.replace(old, new)
-                path.write_text(text, "utf-8")
 
 
 def _modules(package: Path) -> list[Path]:

@@ -5,7 +5,7 @@ from functools import cache
 
 import pytest
 
-from docs.studies.reproduction.one_at_a_time import (
+from docs.studies.reproduction.study import (
     agreement_with_printed,
     changed_values,
     printed_sensitivities,

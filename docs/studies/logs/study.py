@@ -63,6 +63,7 @@ def drawn(number: int, drives: int = DRIVES) -> dict[str, Any]:
     sizes = {
         s.symbol: s.trials[0] * (1 / factor if s.stronger_when_smaller else factor)
         for s in effect.fitted[variant]
+        if s.trials
     }
     label = f"{effect.name} ({variant})" if variant else effect.name
     onset = int(rng.integers(drives // 2 + 1))  # the effect acts for half of the time at least

@@ -197,10 +197,11 @@ def sizes(row: Sequence[Size], rng: np.random.Generator) -> dict[str, float]:
 
 
 def effect_rows(journal: Journal) -> list[list[str]]:
-    """Of each effect, controller and law: valves found, named rightly, and told as returned."""
+    """Of each effect that is missed somewhere: valves found, named rightly, and told as returned."""
     answers = [journal[f"changes, {kind}, {law}"] for kind in KINDS for law in LAWS]
     names = [name for name, *_ in labels()]
-    groups = {name: [name] for name in names}
+    missed = (n for n in names if not all(all(a[n]["found"]) and all(a[n]["right"]) for a in answers))
+    groups = {name: [name] for name in missed}
     groups["**all that an opening can show**"] = [name for name in names if name not in HIDDEN]
     return [
         [title, *(cell for answer in answers for cell in cells([answer[name] for name in own]))]

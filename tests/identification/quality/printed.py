@@ -1,6 +1,6 @@
 """The report's Tables 2 and 3."""
 
-from docs.studies.reproduction.one_at_a_time import PRINTED
+from docs.studies.reproduction.study import PRINTED
 from identification.quality.channel import DescriptiveStatistics
 
 TREND_SLOPES, TREND_OFFSETS = PRINTED["table2"]["slope"], PRINTED["table2"]["offset"]
