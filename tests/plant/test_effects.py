@@ -288,7 +288,7 @@ def test_a_leak_beside_the_seat_goes_on_while_the_seat_is_open(beside, wider):
     """The chamber vents exponentially while the exhaust chokes, by its bore and what lies beside."""
     p = CALIBRATED.replace(A_exh=2e-8, wA_exh=beside, V3=2e-5)
     run = simulate(p, initial=energised(p, p1=12e5, p2=8e5, U=24.0), U=np.zeros(101), period=1e-3)
-    per_pressure = -float(mass_flux.py_func(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
+    per_pressure = -float(mass_flux(1e5, 8e5, 1 / np.sqrt(RT))) / 8e5
     area = float(coefficients(p)[Coefficients._fields.index("orifice_exh"), 0]) + wider
     slope = np.diff(np.log(run.state.p3[50:])) / 1e-3  # the armature has landed
     np.testing.assert_allclose(slope, -RT / p["V3"] * area * per_pressure, rtol=1e-6)

@@ -2,6 +2,8 @@
 
 from dataclasses import replace
 from functools import cache
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,6 +13,7 @@ from controllers.tuned import tuned
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.plantfile import Plant
 from epv_env.signals import RecordedConsumption
+from identification.gap.search.onset import Onset
 from identification.recordings.log_files import Drive, Log
 from training import closed_loop
 from training.closed_loop import KINDS, ClosedLoop, consumption, sentence
@@ -74,6 +77,17 @@ def test_nothing_is_claimed_without_an_effect():
     result = ClosedLoop(logged(), PLANT, policy()).compared(with_effect(tau_p2=0.001))
     assert np.all(np.isnan(result.explained))
     assert "as far as this method can tell" in sentence(result, "recalibrated")[1]
+
+
+def test_only_drives_in_which_the_cause_acts_count():
+    loop = ClosedLoop(logged(), PLANT, policy())
+    kept = SimpleNamespace(labels=("lag",), title="lag of p2")
+    found: Any = SimpleNamespace(onset=Onset("drive-1.csv", 0.99, None), kept=kept)
+    (section,) = loop.sections(found, with_effect(tau_p2=0.02))
+    table: Any = section.blocks[0]
+    assert table.columns[3] == "with lag of p2"
+    assert "drive-1.csv" in table.caption
+    assert "drive-0.csv" not in table.caption
 
 
 def test_a_controller_that_wrote_no_log_is_refused_before_the_diagnosis():

@@ -20,7 +20,7 @@ from epv_env.plant.plantfile import Plant
 from tests.training.closed_forms import CASES, coverage
 from training.evaluation.rollout import run_episodes
 from training.rare.episodes import DISTURBANCE, PLANT, Episodes, NormalsAsDraws
-from training.rare.splitting import Moves, Problem, interval
+from training.rare.splitting import CHAIN, Moves, Problem, interval
 
 pytestmark = pytest.mark.training
 
@@ -42,6 +42,20 @@ def test_the_interval_holds_a_known_probability(name, trials, least):
     hits, ratio = coverage(CASES[name], trials=trials, particles=512, repetitions=10)
     assert hits >= least
     assert ratio == pytest.approx(1.0, abs=1.0 / np.sqrt(trials))
+
+
+def test_an_assumed_share_is_biased_where_levels_tie_and_a_counted_one_is_not():
+    case = CASES["birth-death chain"]
+    problem = Problem(level=case.level, moves=case.moves, particles=512)
+    assumed, counted = [], []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        found = problem.thresholds(case.threshold, 1e-9, rng)
+        repetition = problem.repetition(found, rng)
+        assumed.append(repetition.shares[-1] / CHAIN ** (len(found) - 1))
+        counted.append(repetition.probability)
+    assert np.mean(assumed) / case.truth > 1.3
+    assert np.mean(counted) == pytest.approx(case.truth, rel=0.25)
 
 
 def test_a_level_that_is_never_reached_gives_no_estimate_above_zero():

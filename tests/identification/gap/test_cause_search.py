@@ -8,9 +8,11 @@ from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.fit.evidence import evaluate
 from identification.gap.fit.fitting_problem import FitCache, Hypothesis
 from identification.gap.fit.gauss_newton import fit
+from identification.gap.fit.recalibration import recalibrate
 from identification.gap.judge.verdict import Ranking
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.search import cause_search
+from identification.gap.search.cause_search import HypothesisPool, _leave_causes_out
 from tests.identification.gap.drives import Drive
 
 THREE = {"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1}
@@ -40,6 +42,19 @@ def test_all_that_acts_is_found_and_nothing_else(truth, largest_small, monkeypat
     found = rank_hypotheses(Drive(truth))
     assert sizes(found) == pytest.approx(truth, rel=0.1)
     assert all((found.inclusion[name] > 0.9) == (name in truth) for name in found.inclusion)
+
+
+def test_a_cause_that_has_become_superfluous_is_left_out():
+    """A pool that lacks the true cause alone: it is refitted from where a larger set has it."""
+    problem, base = recalibrate(Drive({"lag": 0.05}))
+    causes = {cause.name: cause for cause in problem.plant.causes}
+    recalibrated = evaluate(problem, [base])[0]
+    pool = HypothesisPool(problem, recalibrated, FitCache(problem.plant))
+    both = Hypothesis(causes=(causes["lag"], causes["drag"]))
+    pool.add(fit(problem, [problem.start(both, {"lag": 0.03, "drag": 0.1})]))
+    assert pool.posterior().hypotheses[0].labels == ("lag", "drag")
+    _leave_causes_out(pool)
+    assert pool.posterior().hypotheses[0].labels == ("lag",)
 
 
 def test_a_search_that_is_resumed_gives_the_undisturbed_answer(tmp_path, monkeypatch):
