@@ -177,7 +177,7 @@ def test_a_device_that_is_not_there_is_refused():
         (SimpleNamespace(requires_grad=True), r"give actions.detach\(\)"),
         (np.zeros(2, dtype="V2"), "bfloat16 as float32"),  # as torch shows its bfloat16
         (np.zeros((2, 2)), "each of 2 valves"),
-        ([[0], [0, 1]], "each of 2 valves"),
+        ([0, 1, 1], "each of 2 valves"),
     ],
 )
 def test_actions_that_a_device_cannot_take_are_refused(actions, words):
