@@ -127,8 +127,8 @@ Count = Annotated[int, COUNT]
 SEED = Number(int, 0, 2**32 - 1)
 Seed = Annotated[int, SEED]
 """What NumPy's and torch's generators take."""
-Seconds = Annotated[float, Number(float, 1e-6, 3600.0)]
-"""Length of an episode [s]: the figures of a longer one than an hour fill the memory."""
+Seconds = Annotated[float, Number(float, 0.1, 3600.0)]
+"""Length of an episode [s], some control periods at least: more than an hour fills the memory."""
 JudgedSeconds = Annotated[float, Number(float, 0.55, 3600.0), "length of an episode [s]"]
 """Length of an episode whose pressures are judged [s]: they count from 0.5 s on."""
 Folder = Annotated[Path, writable_folder, "folder of results"]

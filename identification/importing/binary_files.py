@@ -11,13 +11,12 @@ import numpy as np
 import scipy.io
 from numpy.typing import NDArray
 
-from epv_env.common.files import LARGEST_FILE
 from identification.importing import times
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import (
-    ImportingError,
     SourceChannel,
     check_number,
+    check_unpacked,
     limited,
     needed_package,
     unread,
@@ -32,9 +31,14 @@ def read_mdf(path: Path) -> tuple[str, list[SourceChannel]]:
         if stream.read(3) not in MDF_SIGNATURES:  # asammdf would print a traceback beside its error
             raise ValueError("it does not begin as MDF does")
     with asammdf.MDF(path) as mdf:
+        numbers = sum(group.channel_group.cycles_nr * len(group.channels) for group in mdf.groups)
+        check_unpacked(path, numbers * NUMBER)
         channels = (_mdf_channel(mdf, signal) for signal in mdf.iter_channels(skip_master=True))
         return f"MDF {mdf.version}", limited(path, channels)
 
+
+NUMBER = 8
+"""Bytes of a number as it is read."""
 
 MDF_SIGNATURES = (b"MDF", b"UnF")
 """First bytes of MDF, and of MDF that its writer did not finish."""
@@ -109,7 +113,9 @@ def _waveform_times(properties: Mapping[str, Any], count: int) -> NDArray | None
 def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric column, NaN where it is null; its unit is the field's metadata `unit`, if any."""
     parquet = needed_package("pyarrow.parquet", "Parquet files")
-    check_number(path, parquet.read_metadata(path).num_columns)
+    found = parquet.read_metadata(path)
+    check_number(path, found.num_columns)
+    check_unpacked(path, found.num_rows * found.num_columns * NUMBER)
     return "Parquet", limited(path, _parquet_channels(path, parquet.read_table(path)))
 
 
@@ -152,17 +158,18 @@ def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
     with path.open("rb") as stream:
         head = stream.read(516)
     if HDF5_SIGNATURE in (head[:4], head[512:516]):
+        check_unpacked(path, _hdf5_size(path))
         content = needed_package("pymatreader", "MATLAB 7.3 files").read_mat(str(path))
         version = "MATLAB 7.3"
     else:
-        _check_unpacked(path)
+        check_unpacked(path, _matlab_size(path))
         content = scipy.io.loadmat(path, simplify_cells=True)
         version = "MATLAB 5"
     return version, limited(path, _matlab_channels("", content))
 
 
-def _check_unpacked(path: Path) -> None:
-    """Raises ImportingError if the variables of a MATLAB 5 file say that they unpack too large."""
+def _matlab_size(path: Path) -> int:
+    """Bytes to which the compressed variables of a MATLAB 5 file say that they unpack."""
     content, at, unpacked = path.read_bytes(), 128, 0
     order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
     while order and at + 8 <= len(content):
@@ -171,10 +178,15 @@ def _check_unpacked(path: Path) -> None:
             begin = zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], 8)
             unpacked += struct.unpack(f"{order}II", begin)[1]
         at += 8 + size
-    if unpacked > LARGEST_FILE:
-        raise ImportingError(
-            f"{path} unpacks to more than {LARGEST_FILE:,} bytes: export the bench's channels alone"
-        )
+    return unpacked
+
+
+def _hdf5_size(path: Path) -> int:
+    """Bytes of all arrays of an HDF5 file."""
+    sizes: list[int] = []
+    with needed_package("h5py", "MATLAB 7.3 files").File(path) as file:
+        file.visititems(lambda _, entry: sizes.append(getattr(entry, "nbytes", 0)))
+    return sum(sizes)
 
 
 COMPRESSED = 15

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.common.extras import how_to_install
+from epv_env.common.files import LARGEST_FILE
 
 
 class ImportingError(ValueError):
@@ -91,6 +92,14 @@ def check_number(path: Path, channels: int) -> None:
     if channels > MOST_CHANNELS:
         raise ImportingError(
             f"{path} has more than {MOST_CHANNELS} channels: export only those of the bench"
+        )
+
+
+def check_unpacked(path: Path, size: int) -> None:
+    """Raise ImportingError if a file says that it unpacks to too many bytes, before it is read."""
+    if size > LARGEST_FILE:
+        raise ImportingError(
+            f"{path} unpacks to more than {LARGEST_FILE:,} bytes: export the bench's channels alone"
         )
 
 

@@ -5,10 +5,13 @@ import re
 import struct
 import zlib
 
+import h5py
 import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
 import pytest
 
-from identification.importing.binary_files import read_matlab
+from identification.importing.binary_files import read_matlab, read_parquet
 from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
@@ -138,11 +141,30 @@ def test_the_rest_is_refused_with_the_remedy(true, kind, tmp_path):
         read_files([write(tmp_path / "run", true)], ambient_bar=1.0)
 
 
-def test_a_small_file_that_unpacks_to_two_gigabytes_is_refused_at_once(tmp_path):
-    size = 2**31
-    packed = zlib.compress(struct.pack("<II", 14, size) + bytes(1000))
+def packed_matlab(path):
+    packed = zlib.compress(struct.pack("<II", 14, 2**31) + bytes(1000))
     head = b"MATLAB 5.0 MAT-file".ljust(124) + struct.pack("<H2s", 0x0100, b"IM")
-    path = tmp_path / "bomb.mat"
     path.write_bytes(head + struct.pack("<II", 15, len(packed)) + packed)
+
+
+def packed_hdf5(path):
+    with h5py.File(path, "w", userblock_size=512) as file:
+        file.create_dataset("p2_bar", (1, 2**28), "f8", chunks=(1, 2**20), compression="gzip")
+
+
+def packed_parquet(path):
+    part = pa.table({"p2_bar": np.zeros(2**24)})
+    with pq.ParquetWriter(path, part.schema, compression="zstd") as file:
+        for _ in range(9):
+            file.write_table(part)
+
+
+@pytest.mark.parametrize(
+    ("write", "read"),
+    [(packed_matlab, read_matlab), (packed_hdf5, read_matlab), (packed_parquet, read_parquet)],
+)
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused_at_once(write, read, tmp_path):
+    write(tmp_path / "bomb")
+    assert (tmp_path / "bomb").stat().st_size < 2**22
     with pytest.raises(ImportingError, match="unpacks to more than 1,073,741,824 bytes"):
-        read_matlab(path)
+        read(tmp_path / "bomb")
