@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from epv_env.actions import OnOff
 from epv_env.common.files import JSONFileError, read_json, write_json
 
-FORMAT = "epv-monitor/1"
+FORMAT = "epv-monitor/2"
 REMEDY = "make the monitor anew with `epv monitor`"
 SHIPPED = Path(__file__).with_name("monitor.json")
 """The model of a monitor for the report's valve; `python -m training.monitoring` makes it."""
@@ -65,14 +65,15 @@ STRENGTHS = (0.5, 1.0)
 """Sizes of every effect that are tested, as shares of the model's."""
 
 FEATURES = (
-    "I_on", "I_off_1", "I_off_2", "I_on_1", "I_on_2", "I_on_3", "p3_rest", "p3_off_1", "p3_off_2",
+    "I_off_1", "I_off_2", "I_on_1", "I_on_2", "I_on_3", "p3_rest", "p3_off_1", "p3_off_2",
     "p3_vents_early", "p3_vents_late", "p3_opens", "time_opens", "p2_rise", "p2_rise_1", "p2_rise_2",
     "p2_rise_whole", "p3_fills_1", "p3_fills_2", "p3_fills_late",
 )  # fmt: skip
 """What `features` returns, in this order."""
-CONDITIONS = ("p1", "p2", "open", "U", "slope")
-"""Conditions of an opening: pressures [bar], periods open, voltage [V], slope of p2 [bar/period]."""
-QUADRATIC = 4
+CONDITIONS = ("p1", "p2", "open", "U", "I_on", "slope")
+"""Conditions of an opening: pressures [bar], periods open, voltage [V], current of the held coil per
+voltage [A/V], which tells how warm the winding is, slope of p2 [bar/period]."""
+QUADRATIC = 5
 """Conditions from the first on, whose products count, too."""
 OPEN, KINKS = CONDITIONS.index("open"), (-0.5, 0.5, 1.5, 2.5)
 """Times open at which the dependence on it changes: readings are few in a short opening [periods]."""
@@ -190,14 +191,15 @@ def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
     log = np.log(p3[[i + 1, i + 2, i + 5, i + 9]])
     z = np.array(
         [
-            current[i - 2 : i + 1].sum() / 3, *current[i + 1 : i + 3], *current[j + 1 : j + 4],
+            *current[i + 1 : i + 3], *current[j + 1 : j + 4],
             rest - supply, log[0] - np.log(rest), log[1] - np.log(rest), log[2] - log[1],
             log[3] - log[2], p3[at - 1] + part * (p3[at] - p3[at - 1]), opens - i,
             *rise[j : j + 3], rise[j + 3 : j + 5].sum() / 2, p3[j + 1] - p3[j], p3[j + 2] - p3[j + 1],
             p3[j + 4] - p3[j + 2],
         ]
     )  # fmt: skip
-    return np.array([supply, trend[i], j - opens, voltage, slope]), z
+    held = current[i - 2 : i + 1].sum() / 3
+    return np.array([supply, trend[i], j - opens, voltage, held, slope]), z
 
 
 class OpeningReader:

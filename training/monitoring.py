@@ -8,21 +8,28 @@ makes the model of the report's valve anew, which is shipped.
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from controllers.monitor import LINEAR, SHIPPED, MonitorModel, OpeningReader, polynomial
 from controllers.tuned import tuned
+from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
+from epv_env.plant.supply import Supply
 from training.drives import drives
 
 CONTROLLERS = ("hysteresis", "extrapolating hysteresis", "adaptive pulse")
 """Under which the openings are simulated: their conditions differ."""
 VOLTAGES = (0.92, 0.945, 0.97, 1.0, 1.03, 1.055, 1.08)
 """Of the energised coil, as shares of the plant's."""
+WARMEST = 45.0
+"""Most that a winding is warmer than identified: it is a condition, and no change of the valve [K]."""
+SUPPLY = (9.5, 13.5)
+"""Range of a constant supply, under which every other drive is simulated [bar]."""
 VALVES = 48
 """Unchanged valves; with fewer than two per feature their scatter is not known: false alarms."""
 REPEATED = 6
@@ -124,9 +131,18 @@ def _simulated(
     episodes: number of each one's disturbance; seed: of all; voltages: shares of the plant's.
     """
     rows: list[tuple[NDArray, NDArray, int, int]] = []
-    for number, (kind, voltage) in enumerate(product(CONTROLLERS, voltages)):
+    for number, (kind, voltage, supplied) in enumerate(product(CONTROLLERS, voltages, (False, True))):
         seeds = [(seed * 100 + number) * 1000 + episode for episode in episodes]
-        chosen = {"parameters": list(plants)}
+        drawn = [np.random.default_rng(own).random(2).tolist() for own in seeds]
+        chosen: dict[str, Any] = {
+            "parameters": [
+                p.replace(R=p["R"] * (1.0 + COPPER * WARMEST * warmth))
+                for p, (warmth, _) in zip(plants, drawn, strict=True)
+            ]
+        }
+        if supplied:
+            low, high = SUPPLY
+            chosen["supply"] = [Supply.constant(low + share * (high - low)) for _, share in drawn]
         for valve, drive in enumerate(drives(plant, tuned(kind, plant), seeds, chosen, voltage=voltage)):
             rows += [(x, z, valve, number * len(plants) + valve) for x, z in openings(drive)]
     return Openings(*(np.array(column) for column in zip(*rows, strict=True)))

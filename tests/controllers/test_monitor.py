@@ -29,6 +29,7 @@ from controllers.monitor import (
 )
 from epv_env.common.files import JSONFileError
 from epv_env.plant.plantfile import Plant
+from epv_env.plant.supply import Supply
 from identification.recordings.log_files import Log, read_log
 from tests.training.exports import sanitisers
 from training.commands.monitor import agreement, follow, sentences
@@ -261,6 +262,18 @@ def test_what_is_shipped_finds_a_change_and_its_return() -> None:
         assert len(monitor.changes) == part
     assert [next(iter(c.causes)) for c in monitor.changes] == ["eddy_current", RETURN]
     assert [c.onset for c in monitor.changes] == pytest.approx([60.0, 120.0], abs=6.0)
+
+
+def test_a_warm_winding_and_another_supply_are_no_change() -> None:
+    plant, controller = Plant.calibrated(), Hysteresis(open_below=-0.3, shut_above=0.0)
+    monitor, R = Monitor(MonitorModel.load(SHIPPED)), plant.parameters["R"]
+    for warm, bar in [(1.0, 12.0), (1.08, 10.0), (1.15, 13.0)]:
+        chosen = {"parameters": [plant.parameters.replace(R=warm * R)], "supply": Supply.constant(bar)}
+        (drive,) = drives(plant, controller, [7], chosen)
+        monitor.follow(drive)
+    assert len(monitor.history) > 30
+    assert monitor.probability < 0.5
+    assert not monitor.changes
 
 
 HOSTILE = """

@@ -26,7 +26,7 @@ from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from docs.studies.logs.study import deviate
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.files import Journal
+from epv_env.common.files import Journal, digest, read_bytes
 from epv_env.common.results_folder import progress
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
@@ -55,8 +55,9 @@ VOLTAGES = (0.92, 1.08)
 HIDDEN = (
     "pressure dependent discharge", "flow force", "local gas speed (a1)", "local gas speed (a2)",
     "seat leak", "circuit leak", "pressure sensor bias (p2)", "pressure sensor gain (p2)",
+    "coil heating",
 )  # fmt: skip
-"""Effects that an opening cannot show (docs/explanation/diagnosis.md, 9)."""
+"""Effects that an opening cannot show (docs/explanation/diagnosis.md, 9), or that are a condition."""
 
 CLEAN, MISSING, SUPPLY, WARM = "clean", "rows missing, restarts", "another supply", "warm coil"
 RUNS = {CLEAN: 9, MISSING: 3, SUPPLY: 3, WARM: 3}
@@ -262,7 +263,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     runs = dict.fromkeys(RUNS, 1) if options.quick else RUNS
     changed, unchanged = ((1, 1), (8, 1)) if options.quick else ((VALVES, PART), (UNCHANGED, DRIVES))
-    subject = {"seed": SEED, "changed": changed, "unchanged": unchanged}
+    model = digest(read_bytes(SHIPPED))
+    subject = {"model": model, "seed": SEED, "changed": changed, "unchanged": unchanged}
     journal = Journal(options.out / "results.jsonl", subject)
     missing = {
         name: task

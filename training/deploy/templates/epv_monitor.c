@@ -91,13 +91,14 @@ static int features(const double (*r)[6], int rows, double *x, double *z) {
     const double part = ($rise - rise[at - 1]) / (rise[at] - rise[at - 1]), opens = at - 1 + part;
     const double U = r[i - 1][1];
     const double all[N] = {
-        level / U, r[i + 1][5] / U, r[i + 2][5] / U, r[j + 1][5] / U, r[j + 2][5] / U,
+        r[i + 1][5] / U, r[i + 2][5] / U, r[j + 1][5] / U, r[j + 2][5] / U,
         r[j + 3][5] / U, rest - supply, log(r[i + 1][4] / rest), log(r[i + 2][4] / rest),
         log(r[i + 5][4] / r[i + 2][4]), log(r[i + 9][4] / r[i + 5][4]),
         r[at - 1][4] + part * (r[at][4] - r[at - 1][4]), opens - i, rise[j], rise[j + 1], rise[j + 2],
         (rise[j + 3] + rise[j + 4]) / 2, r[j + 1][4] - r[j][4], r[j + 2][4] - r[j + 1][4],
         r[j + 4][4] - r[j + 2][4]};
-    const double c[$conditions] = {supply, mean + slope * (i - (n - 1) / 2.0), j - opens, U, slope};
+    const double c[$conditions] = {supply, mean + slope * (i - (n - 1) / 2.0), j - opens, U, level / U,
+                                     slope};
     memcpy(z, all, sizeof all);
     x[0] = 1.0;
     int next = 1 + $conditions;
