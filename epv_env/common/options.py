@@ -127,7 +127,7 @@ Count = Annotated[int, COUNT]
 SEED = Number(int, 0, 2**32 - 1)
 Seed = Annotated[int, SEED]
 """What NumPy's and torch's generators take."""
-Seconds = Annotated[float, Number(float, 0.1, 3600.0)]
+Seconds = Annotated[float, Number(float, 0.05, 3600.0)]
 """Length of an episode [s], some control periods at least: more than an hour fills the memory."""
 JudgedSeconds = Annotated[float, Number(float, 0.55, 3600.0), "length of an episode [s]"]
 """Length of an episode whose pressures are judged [s]: they count from 0.5 s on."""
