@@ -5,13 +5,10 @@ problem. Eliminating them from the normal equations leaves equations in the para
 (Golub and Pereyra 1973; Schur complement).
 """
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-import numba
 import numpy as np
-from numba.extending import register_jitable
 from numpy.typing import NDArray
 
 ROUNDING = 1e-10
@@ -30,79 +27,40 @@ def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDAr
     return np.clip(_pivoted(scaled, moment * scale, low / scale, high / scale) * scale, low, high)
 
 
-# Loops over numbers: numba takes ten times as long to compile what NumPy writes in a line.
-@numba.njit(cache=True)
-def _pivoted(matrix, moment, low, high):
+def _pivoted(matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray) -> NDArray:
     """The minimiser (n,): numbers beyond a bound go there, those that push inwards leave it.
 
     Where exchanging all of them together has not helped three times, the last one alone is exchanged,
     which ends; few problems need more than five exchanges.
     """
-    n = len(moment)
-    place, x = np.zeros(n, np.int64), np.zeros(n)
-    for i in range(n):  # -1: at the lower bound, 1: at the upper one, 0: between
-        place[i] = -1 if high[i] <= low[i] else 0
-    fewest, tries = n + 1, 3
+    place = np.where(high <= low, -1, 0)  # -1: at the lower bound, 1: at the upper one, 0: between
+    x, fewest, tries = np.zeros(len(moment)), len(moment) + 1, 3
     for _ in range(100):
-        _minimise(matrix, moment, low, high, place, x)
-        wrong, last = 0, 0
-        for i in range(n):
-            if _wanted(i, matrix, moment, low, high, place, x) != place[i]:
-                wrong, last = wrong + 1, i
-        if wrong == 0:
+        free = np.flatnonzero(place == 0)
+        x = np.where(place < 0, low, np.where(place > 0, high, 0.0))
+        if len(free):
+            own = matrix[free]
+            x[free] = np.linalg.solve(own[:, free], moment[free] - own @ x)
+        target = _wanted(matrix, moment, low, high, place, x)
+        wrong = np.flatnonzero(target != place)
+        if not len(wrong):
             break
-        tries = 3 if wrong < fewest else tries - 1
-        fewest = min(fewest, wrong)
-        for i in range(n):
-            if tries >= 0 or i == last:
-                place[i] = _wanted(i, matrix, moment, low, high, place, x)
+        tries = 3 if len(wrong) < fewest else tries - 1
+        fewest = min(fewest, len(wrong))
+        if tries < 0:
+            wrong = wrong[-1:]
+        place[wrong] = target[wrong]
     return x
 
 
-@register_jitable
-def _minimise(matrix, moment, low, high, place, x):
-    """Write the minimiser over the numbers between the bounds into x, by Cholesky's decomposition."""
-    n = len(x)
-    factor = np.eye(n)
-    for i in range(n):
-        x[i] = 0.0 if place[i] == 0 else (low[i] if place[i] < 0 else high[i])
-        for j in range(i + 1):
-            if place[i] == 0 and place[j] == 0:
-                rest = matrix[i, j]
-                for k in range(j):
-                    rest -= factor[i, k] * factor[j, k]
-                factor[i, j] = rest / factor[j, j] if j < i else math.sqrt(rest)
-    bounds = x.copy()
-    for i in range(n):
-        if place[i] == 0:
-            x[i] = -_slope(i, matrix, moment, bounds)
-        for k in range(i):
-            x[i] -= factor[i, k] * x[k]
-        x[i] /= factor[i, i]
-    for i in range(n - 1, -1, -1):
-        for k in range(i + 1, n):
-            x[i] -= factor[k, i] * x[k]
-        x[i] /= factor[i, i]
-
-
-@register_jitable
-def _slope(i, matrix, moment, x):
-    """Slope of the function by number i."""
-    slope = -moment[i]
-    for j in range(len(x)):
-        slope += matrix[i, j] * x[j]
-    return slope
-
-
-@register_jitable
-def _wanted(i, matrix, moment, low, high, place, x):
-    """Where number i wants to be: -1 at its lower bound, 1 at the upper one, 0 between."""
-    if high[i] <= low[i]:
-        return place[i]
-    if place[i] != 0:
-        return 0 if place[i] * _slope(i, matrix, moment, x) > ROUNDING else place[i]
-    tolerance = ROUNDING * (1.0 + abs(x[i]))
-    return int(x[i] > high[i] + tolerance) - int(x[i] < low[i] - tolerance)
+def _wanted(
+    matrix: NDArray, moment: NDArray, low: NDArray, high: NDArray, place: NDArray, x: NDArray
+) -> NDArray:
+    """Where each number wants to be: -1 at its lower bound, 1 at the upper one, 0 between, (n,)."""
+    tolerance = ROUNDING * (1.0 + np.abs(x))
+    beyond = 1 * (x > high + tolerance) - 1 * (x < low - tolerance)
+    kept = np.where(place * (matrix @ x - moment) > ROUNDING, 0, place)
+    return np.where(high <= low, place, np.where(place == 0, beyond, kept))
 
 
 LARGEST_DEVIATION = 3.0
