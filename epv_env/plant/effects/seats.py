@@ -3,59 +3,40 @@
 from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.primitives import inlined
 
-INLET_SEAT_LEAK = Effect(
-    name="inlet_seat_leak",
-    component="control_chamber",
-    strength=("leak_inlet",),
-    form="effective area of the seat from A, shut, to the bore's and w A",
-    source="seat leakage, up to a tenth of the bores",
-    sizes=(
-        Size(
-            symbol="A_in",
-            constant="leak_inlet",
-            unit="m^2",
-            domain=(0, 4e-8),
-            meaning="effective area of the shut MV inlet",
-            trials=(4e-9,),
-            drawn=(2e-9, 2e-8),
-        ),
-        Size(
-            symbol="wA_in",
-            unit="1",
-            domain=(0, 1),
-            meaning="share of this leak beside the seat: it goes on while the seat is open",
-            spread=0.5,
-        ),
-    ),
-    constants=(Constant("beside_inlet", lambda p: p["wA_in"], is_size=False),),
-)
 
-EXHAUST_SEAT_LEAK = Effect(
-    name="exhaust_seat_leak",
-    component="control_chamber",
-    strength=("leak_exhaust",),
-    form="effective area of the seat from A, shut, to the bore's and w A",
-    source="seat leakage, up to a tenth of the bores",
-    sizes=(
-        Size(
-            symbol="A_exh",
-            constant="leak_exhaust",
-            unit="m^2",
-            domain=(0, 4e-8),
-            meaning="effective area of the shut MV exhaust",
-            trials=(4e-9,),
-            drawn=(2e-9, 2e-8),
+def _magnet_seat_leak(seat: str, end: str) -> Effect:
+    """The leak of a seat of the magnet valve; end: of its symbols."""
+    area, share = f"A_{end}", f"wA_{end}"
+    return Effect(
+        name=f"{seat}_seat_leak",
+        component="control_chamber",
+        strength=(f"leak_{seat}",),
+        form="effective area of the seat from A, shut, to the bore's and w A",
+        source="seat leakage, up to a tenth of the bores",
+        sizes=(
+            Size(
+                symbol=area,
+                constant=f"leak_{seat}",
+                unit="m^2",
+                domain=(0, 4e-8),
+                meaning=f"effective area of the shut MV {seat}",
+                trials=(4e-9,),
+                drawn=(2e-9, 2e-8),
+            ),
+            Size(
+                symbol=share,
+                unit="1",
+                domain=(0, 1),
+                meaning="share of this leak beside the seat: it goes on while the seat is open",
+                spread=0.5,
+            ),
         ),
-        Size(
-            symbol="wA_exh",
-            unit="1",
-            domain=(0, 1),
-            meaning="share of this leak beside the seat: it goes on while the seat is open",
-            spread=0.5,
-        ),
-    ),
-    constants=(Constant("beside_exhaust", lambda p: p["wA_exh"], is_size=False),),
-)
+        constants=(Constant(f"beside_{seat}", lambda p: p[share], is_size=False),),
+    )
+
+
+INLET_SEAT_LEAK = _magnet_seat_leak("inlet", "in")
+EXHAUST_SEAT_LEAK = _magnet_seat_leak("exhaust", "exh")
 
 SEAT_LEAK = Effect(
     name="seat_leak",
