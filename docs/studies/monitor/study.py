@@ -28,6 +28,7 @@ from docs.studies.logs.study import deviate
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, digest, read_bytes
 from epv_env.common.results_folder import progress
+from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
@@ -70,8 +71,6 @@ SUPPLIES = (9.5, 13.0)
 """Range of a constant supply in place of the bench's reservoirs, anew for each drive [bar]."""
 WARMEST, WARMING = 40.0, 4.0
 """Most that a winding is warmer than identified, and its change from drive to drive [K]."""
-COPPER = 0.0039
-"""Growth of the winding's resistance [1/K]."""
 
 
 class Fleet:
