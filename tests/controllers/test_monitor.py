@@ -27,6 +27,7 @@ from controllers.monitor import (
     MonitorModel,
     OpeningReader,
 )
+from epv_env.common.commands import main_of
 from epv_env.common.files import JSONFileError
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.supply import Supply
@@ -221,7 +222,7 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
 
 
 def test_a_diagnosis_that_differs_is_explained() -> None:
-    content: dict[str, Any] = {
+    content: Any = {
         "verdict": "no_gap", "ambiguity_set": [], "absorbed": ["second (x)"], "onset": None,
         "causes": [], "levels": {"form": {}},
     }  # fmt: skip
@@ -249,6 +250,21 @@ def test_a_diagnosis_that_differs_is_explained() -> None:
     assert "names third, which hardly shows" in said()
     content["ambiguity_set"] = []
     assert "does not name second, since it allows for a misfit" in said()
+
+
+def test_another_file_than_a_diagnosis_is_refused_before_anything_is_written(tmp_path, capsys) -> None:
+    write_log(
+        tmp_path / "LOGS",
+        Hysteresis(open_below=-0.3, shut_above=0.0),
+        Plant.calibrated(),
+        [1],
+        duration=1.0,
+    )
+    (tmp_path / "gap.json").write_text('{"format": "epv-gap/3"}', encoding="utf-8")
+    words = [str(tmp_path / "LOGS"), "--gap", str(tmp_path / "gap.json"), "--out", str(tmp_path / "out")]
+    assert main_of("training.commands.monitor", program="epv monitor", arguments=words) == 2
+    assert "'verdict' is missing: diagnose the log" in capsys.readouterr().err
+    assert not list((tmp_path / "out").glob("*"))
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:

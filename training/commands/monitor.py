@@ -8,10 +8,10 @@ What the monitor knows of the report's valve is shipped. Another plant is simula
 effect of the catalogue: a minute or two, once.
 """
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, TypedDict
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -19,10 +19,11 @@ from matplotlib.figure import Figure
 
 from controllers.monitor import RETURN, SHIPPED, UNKNOWN, Change, Monitor, MonitorModel
 from epv_env.common.command_line import NextStep, beside
-from epv_env.common.files import decoded
+from epv_env.common.files import read_json
 from epv_env.common.options import Folder, Number, PlantFile, Seed
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
+from identification.gap.report.gap_json import FORMAT
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.recording import rules_of
 from training.evaluation.plots import save_figure
@@ -34,6 +35,30 @@ START = 1.0
 """Time up to which a change has come before the start [s]."""
 LIKELY = 0.05
 """Probability from which a cause is named."""
+
+
+class _Began(TypedDict):
+    drive: str
+
+
+class _Cause(TypedDict):
+    effects: list[str]
+    onset: dict[str, _Began]
+
+
+class _Levels(TypedDict):
+    form: dict[str, Any]
+
+
+class _Finding(TypedDict):
+    """What is compared of gap.json."""
+
+    verdict: str
+    ambiguity_set: list[list[str]]
+    absorbed: list[str]
+    onset: Any
+    causes: list[_Cause]
+    levels: _Levels
 
 
 @dataclass(frozen=True)
@@ -57,6 +82,7 @@ def run(options: Options) -> None:
     plant = load_plant(options.plant)
     log = read_log(options.log, rules_of(plant))
     log.check_period(Monitor.period, "the monitor counts periods of")
+    finding = options.gap and read_json(options.gap, _Finding, version=FORMAT, remedy="diagnose the log")
     if options.plant and not options.model:
         model = monitor_model(plant, seed=options.seed)
     else:
@@ -66,8 +92,8 @@ def run(options: Options) -> None:
     ends = follow(monitor, log)
     save_figure(picture(monitor, ends), options.out / FIGURE)
     print(*sentences(monitor, log, ends), sep="\n")
-    if options.gap:
-        print(agreement(monitor, log, ends, decoded(options.gap, remedy="diagnose the log")))
+    if finding:
+        print(agreement(monitor, log, ends, finding))
     print(f"written: {options.out / FIGURE}")
 
 
@@ -117,7 +143,7 @@ def _began(change: Change, log: Log, ends: Sequence[float]) -> tuple[str, float]
     return log.drives[number].file, change.onset - (ends[number - 1] if number else 0.0)
 
 
-def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: Mapping[str, Any]) -> str:
+def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: _Finding) -> str:
     """What the diagnosis of the same log says otherwise, and why; content: of gap.json."""
     named = {name for effects in content["ambiguity_set"] for name in effects}
     changes = {next(iter(change.causes)): change for change in reversed(monitor.changes)}
@@ -137,7 +163,7 @@ def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: Mappin
     return f"The diagnosis ({content['verdict']}) {'; it '.join(said)}."
 
 
-def _unseen(monitor: Monitor, name: str, seen: Collection[str], content: Mapping[str, Any]) -> str:
+def _unseen(monitor: Monitor, name: str, seen: Collection[str], content: _Finding) -> str:
     """Why the monitor has not told an effect."""
     hidden = any(f"{name} (p2)" in label for label in content["levels"]["form"])
     if name not in monitor.model.effects or hidden:
@@ -149,7 +175,7 @@ def _unseen(monitor: Monitor, name: str, seen: Collection[str], content: Mapping
     return "for which the monitor needs more openings, or a larger effect, at the stated false alarms"
 
 
-def _unnamed(change: Change, name: str, named: Collection[str], content: Mapping[str, Any]) -> str:
+def _unnamed(change: Change, name: str, named: Collection[str], content: _Finding) -> str:
     """Why the diagnosis has not named what the monitor tells."""
     if change.onset < START:
         return "by which the valve differs from the start on: there the four parameters are refitted"
@@ -160,7 +186,7 @@ def _unnamed(change: Change, name: str, named: Collection[str], content: Mapping
     return "since it allows for a misfit that no model is free of; the monitor compares openings alone"
 
 
-def _drive_with(name: str, content: Mapping[str, Any], log: Log) -> str:
+def _drive_with(name: str, content: _Finding, log: Log) -> str:
     """File of the first drive with an effect, according to gap.json."""
     onsets = [o for c in content["causes"] for o in c["onset"].items() if name in c["effects"]]
     first = log.drives[0].file

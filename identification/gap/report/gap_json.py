@@ -25,6 +25,7 @@ from identification.gap.locate.localisation import Localisation, MissingTerm
 from identification.gap.search.posterior import variance_inflation
 
 GAP, TERM = "gap.json", "missing_term.json"
+FORMAT = "epv-gap/3"
 
 LISTED_CAUSES = 10
 """Most causes in gap.json; the others are the least probable."""
@@ -66,7 +67,7 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
     overall["black_box_floor"] = reduction.black_box.overall
     inclusion = _noticeable(ranking.inclusion)
     return {
-        "format": "epv-gap/3",
+        "format": FORMAT,
         "verdict": conclusion.verdict,
         "where": {
             "component": conclusion.component_probabilities,
