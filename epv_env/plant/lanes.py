@@ -4,11 +4,12 @@ A table is an array [row, lane] whose columns are valves, so that a loop over la
 whole SIMD registers. The kernels work on one such table per block, the workspace, with these rows.
 """
 
+import numba
 import numpy as np
 
 from epv_env.plant.effects.registry import Effects
 from epv_env.plant.equations import Coefficients, Inputs, State
-from epv_env.plant.primitives import generated, inlined
+from epv_env.plant.primitives import FLAGS, generated, inlined
 
 LANES = 16
 """Valves per block. LLVM vectorises a loop of this known length without run-time checks."""
@@ -111,7 +112,8 @@ moved = generated(
 """q + h * rates, field by field."""
 
 
-@inlined
+# Compiled on its own: within its callers LLVM makes code of it that takes ten times as long.
+@numba.njit(forceinline=True, **FLAGS)
 def copy_column(source, source_row, source_lane, target, target_row, target_lane, n_rows):
     """Copy n_rows rows of one lane from table to table."""
     for row in range(n_rows):
