@@ -1,6 +1,5 @@
 """The policy's network: a small multilayer perceptron, and the weight of the advice beside it."""
 
-import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -23,6 +22,23 @@ class Weights(NamedTuple):
 
 
 @compiled
+def tangent(x):
+    """tanh(x) within 2.5e-7: Lambert's continued fraction, broken off after six terms, gives
+    n/d = tanh(x/2), and tanh(x) = 2 (n/d) / (1 + (n/d)^2).
+
+    No term is subtracted. Unlike the library's, many at once are computed in vectors.
+    """
+    if x > 9.02:
+        return 1.0
+    if x < -9.02:
+        return -1.0
+    s = 0.25 * x * x
+    n = 0.5 * x * ((21.0 * s + 1260.0) * s + 10395.0)
+    d = ((s + 210.0) * s + 4725.0) * s + 10395.0
+    return 2.0 * n * d / (n * n + d * d)
+
+
+@compiled
 def forward(weights, inputs, signals):
     """Logits of coil off and on, into the first two of signals[0]; the advice is the last input.
 
@@ -38,14 +54,12 @@ def forward(weights, inputs, signals):
         for i in range(n):
             at += m
             value = inputs[i] if layer == 0 else source[i]
-            j = 0  # the inner loop runs over outputs: a CPU can vectorise it
-            while j < m:  # no range: an accelerator's compiler would allow for negative indices
-                out[j] += value * weights.numbers[at + j]
-                j += 1
+            for j in range(m):  # over outputs, by indices never negative: both let it run in vectors
+                out[j] += value * weights.numbers[np.uintp(at + j)]
         at += m
         if layer < last:
             for j in range(m):
-                out[j] = math.tanh(out[j])
+                out[j] = tangent(out[j])
     for j in range(2):
         signals[0, j] += inputs[widths[0] - 1] * weights.advice[j]
 

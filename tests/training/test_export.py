@@ -134,7 +134,7 @@ def test_nothing_in_it_is_undefined(any_copy, tmp_path):
     ("file", "pattern", "instead"),
     [
         ("epv_policy.c", r"(BIAS_0\[\d+\] = \{\s*)[^,]+,", r"\g<1>3.0f,"),
-        ("epv_policy.c", r"10395\.0f;", "10394.0f;"),
+        ("epv_learner.h", r"10395\.0f\)", "10394.0f)"),
         ("epv_learner.h", r"(SENSOR_CHECK_P2_LAGS\[\d+\] = \{\s*1\.0f, 2\.0f, )4", r"\g<1>3"),
         ("epv_policy.c", r"m->waited = 1;", "m->waited = 0;"),
         ("epv_learner.h", r"/ v->pace\)", "/ (1.02f * v->pace))"),
@@ -164,7 +164,7 @@ def test_it_needs_three_functions_and_changes_no_global(any_copy):
 def test_tanh_is_good_to_seven_units_in_the_last_place(fitted, tmp_path):
     copied(fitted[1], tmp_path)
     (tmp_path / "tanh.c").write_text(
-        '#include "epv_policy.c"\nfloat tanh_of(float x) { return hyperbolic_tangent(x); }\n'
+        '#include "epv_policy.c"\nfloat tanh_of(float x) { return fn_tangent(x); }\n'
     )
     built = build(["cc"], tmp_path, "-shared", "-fPIC", "tanh.c", "-lm", output="tanh.so")
     function = ctypes.CDLL(str(built)).tanh_of

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers import knowledge, pulse, sensor_check, valve_learner
+from controllers import knowledge, network, pulse, sensor_check, valve_learner
 from controllers.knowledge import RULES, SHIELDS
 from controllers.policy import Policy
 from controllers.policy_files import learnt_contract
@@ -82,7 +82,7 @@ class Export:
 
 
 def controller_c(export: Export) -> ControllerC:
-    """C of all but the network. Raises ExportError for what has no form in C."""
+    """C of all but the network's layers. Raises ExportError for what has no form in C."""
     parts = export.policy.constants
     table = parts.knowledge.table._asdict()
     constants = {
@@ -104,6 +104,7 @@ def controller_c(export: Export) -> ControllerC:
     c.function(knowledge.keeps_on, (VALVE,))
     c.function(knowledge.above_band, (REAL,))
     c.function(knowledge.forced, (VALVE, REAL))
+    c.function(network.tangent, (REAL,))
     return c
 
 

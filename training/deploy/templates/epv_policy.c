@@ -25,20 +25,6 @@ typedef struct {
 static const float ADVICE[2] = {$advice};
 
 $arrays
-/* Hyperbolic tangent to 7 units in the last place: Lambert's continued fraction, broken off after
- * six terms, gives n/d = tanh(x/2); tanh(x) = 2 (n/d) / (1 + (n/d)^2). No term is subtracted. */
-static float hyperbolic_tangent(float x)
-{
-    const float y = 0.5f * x, s = y * y;
-    const float n = y * ((21.0f * s + 1260.0f) * s + 10395.0f);
-    const float d = ((s + 210.0f) * s + 4725.0f) * s + 10395.0f;
-    if (x > 9.02f)
-        return 1.0f;
-    if (x < -9.02f)
-        return -1.0f;
-    return 2.0f * n * d / (n * n + d * d);
-}
-
 static float row(const layer *l, int j, const float *signal)
 {
     const float *weight = l->weight + j * l->inputs;
@@ -94,7 +80,7 @@ void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
     for (k = 0; k < LAYERS - 1; k++) {
         float *out = buffers[k % 2];
         for (j = 0; j < NETWORK[k].outputs; j++)
-            out[j] = hyperbolic_tangent(row(&NETWORK[k], j, signal));
+            out[j] = fn_tangent(row(&NETWORK[k], j, signal));
         signal = out;
     }
     for (j = 0; j < 2; j++)
