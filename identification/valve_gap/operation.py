@@ -131,7 +131,7 @@ def _in_its_drives(valve: "LoggedValve", seed: int, cache: FitCache) -> Diagnosi
     if found.best and len(found.best.hypothesis.labels) == 1:
         (label,) = found.best.hypothesis.labels
         refitted = spans | {label: _span_by_refits(valve, spans, found)}
-        if refitted[label] != replace(spans[label], probability=refitted[label].probability):
+        if (refitted[label].first, refitted[label].end) != (spans[label].first, spans[label].end):
             cache = cache.named("in its drives: ")
             found = diagnose(valve.acting_in(refitted), seed=seed, cache=cache)
         spans = refitted
@@ -158,7 +158,7 @@ def _span_by_refits(valve: "LoggedValve", spans: Mapping[str, Span], found: Diag
 
     def refit(span: tuple[int, int]) -> None:
         plant = copy(prepared(problem.plant))
-        plant.plant = valve.acting_in({**spans, cause.label: Span(*span, 1.0, False)})
+        plant.plant = valve.acting_in({**spans, cause.label: Span(*span, 1.0, False, span)})
         narrowed = FittingProblem(plant, problem.slopes, thorough=problem.thorough)
         squares[span] = fit(narrowed, [restarted(estimate)], iterations=3)[0].chi_square
 

@@ -39,6 +39,8 @@ LIKELY = 0.05
 
 class _Began(TypedDict):
     drive: str
+    earliest: str
+    latest: str
 
 
 class _Cause(TypedDict):
@@ -155,9 +157,12 @@ def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: _Findi
         for name in sorted(seen - named)
     ]
     for name in sorted(named & seen):
-        own, other = _began(changes[name], log, ends)[0], _drive_with(name, content, log)
-        if own != other:
-            said.append(f"has {name} begin in {other}, not {own}: it weighs whole drives, not openings")
+        own, files = _began(changes[name], log, ends)[0], [drive.file for drive in log.drives]
+        other = _drive_with(name, content, files[0])
+        if not files.index(other["earliest"]) <= files.index(own) <= files.index(other["latest"]):
+            said.append(
+                f"has {name} begin in {other['drive']}, not {own}: it weighs whole drives, not openings"
+            )
     if not said:
         return f"The diagnosis agrees: {content['verdict']}."
     return f"The diagnosis ({content['verdict']}) {'; it '.join(said)}."
@@ -186,11 +191,11 @@ def _unnamed(change: Change, name: str, named: Collection[str], content: _Findin
     return "since it allows for a misfit that no model is free of; the monitor compares openings alone"
 
 
-def _drive_with(name: str, content: _Finding, log: Log) -> str:
-    """File of the first drive with an effect, according to gap.json."""
+def _drive_with(name: str, content: _Finding, first: str) -> _Began:
+    """The first drive with an effect, according to gap.json; first: file of the log's first drive."""
     onsets = [o for c in content["causes"] for o in c["onset"].items() if name in c["effects"]]
-    first = log.drives[0].file
-    return next((own["drive"] for label, own in onsets if label.split(" ")[0] == name), first)
+    throughout = _Began(drive=first, earliest=first, latest=first)
+    return next((own for label, own in onsets if label.split(" ")[0] == name), throughout)
 
 
 def picture(monitor: Monitor, ends: list[float]) -> Figure:

@@ -19,6 +19,9 @@ from identification.gap.search.screening import CauseSignature, with_changes
 KINDS = {"whole": 0.5, "late": 0.4, "mended": 0.1}
 """Probability before the data that a cause acts in all drives, from a later one on, or ends [1]."""
 
+CONFIDENCE = 0.95
+"""Probability that a cause begins between the drives that are given [1]."""
+
 
 @dataclass(frozen=True)
 class Onset:
@@ -30,6 +33,10 @@ class Onset:
     """That the cause begins and ends there, if it acts at all."""
     mended: str | None
     """File of the first drive after them; None where it acts to the end."""
+    earliest: str
+    """The first drive lies between this file and `latest` with the probability CONFIDENCE: it may be one
+    that shows the cause too little, or has no openings."""
+    latest: str
 
 
 @dataclass(frozen=True)
@@ -44,11 +51,16 @@ class Span:
     """That it begins and ends there, if the cause acts at all."""
     whole: bool
     """Whether these are all drives of the log."""
+    first_between: tuple[int, int]
+    """Least and largest number of the first drive with the probability CONFIDENCE."""
 
     def onset(self, drives: Sequence[str]) -> Onset | None:
         """In words; None where the cause acts in all drives."""
         mended = drives[self.end] if self.end < len(drives) else None
-        return None if self.whole else Onset(drives[self.first], self.probability, mended)
+        earliest, latest = (drives[number] for number in self.first_between)
+        return (
+            None if self.whole else Onset(drives[self.first], self.probability, mended, earliest, latest)
+        )
 
 
 def spans_of_causes(
@@ -126,7 +138,11 @@ def likeliest_span(
     # A drive without fitted openings makes ties: the shortest span has what shows the cause.
     lengths = [end - first for first, end in spans]
     best = min(range(len(spans)), key=lambda k: (-round(float(chances[k]), 6), lengths[k]))
-    return Span(*spans[best], float(chances[best]), kinds[best] == "whole")
+    first = np.bincount([begin for begin, _ in spans], weights=chances, minlength=count)
+    order = np.argsort(-first, kind="stable")
+    likely = order[: 1 + np.searchsorted(np.cumsum(first[order]), CONFIDENCE)]
+    between = (int(min(likely.min(), spans[best][0])), int(max(likely.max(), spans[best][0])))
+    return Span(*spans[best], float(chances[best]), kinds[best] == "whole", between)
 
 
 def least_squares_by_span(

@@ -81,7 +81,7 @@ def test_a_cause_acts_from_its_drive_on(symbol, size, healthy):
     log = read_log(healthy)
     campaign, steady = steady_openings(log, PLANT)
     whole = LoggedValve(campaign, PLANT, steady)
-    late = whole.acting_in({c.label: Span(1, 2, 1.0, False) for c in whole.causes})
+    late = whole.acting_in({c.label: Span(1, 2, 1.0, False, (1, 1)) for c in whole.causes})
     runs = range(len(whole.runs))
     acting = {symbol: np.array([size])}
     none, every, second = (
@@ -122,12 +122,15 @@ def test_each_cause_has_its_drives_also_beside_another_one():
     for label in sizes:
         assert (spans[label].first, spans[label].end) == true[label]
         assert spans[label].probability > 0.9
-    assert spans["first"].onset(["a", "b", "c", "d"]) == Onset("b", spans["first"].probability, "d")
+    assert spans["first"].onset(["a", "b", "c", "d"]) == Onset(
+        "b", spans["first"].probability, "d", "b", "b"
+    )
 
 
 def test_of_spans_that_no_opening_tells_apart_the_shortest_is_taken():
     spans = [(0, 3), (1, 3), (2, 3)]  # nothing was compared in the second drive
-    assert likeliest_span(np.array([900.0, 500.0, 500.0]), spans, 3, 500).first == 2
+    span = likeliest_span(np.array([900.0, 500.0, 500.0]), spans, 3, 500)
+    assert (span.first, span.first_between) == (2, (1, 2))
 
 
 @pytest.mark.parametrize(("grams", "count"), [(0.0, 4), (-0.3, 4), (0.3, 0)])
