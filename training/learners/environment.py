@@ -22,8 +22,9 @@ ROLLOUT = 64
 SHORTEST, LONGEST = 300, 600
 """Lengths of the training episodes [control periods]. Different lengths keep the environments out of
 step: every rollout sees all parts of an episode."""
-CONDITIONS = Conditions(braking=0.5)
-"""Half of the training episodes brake hard: a good policy leaves the band only there."""
+CONDITIONS = Conditions(braking=0.5, vented=0.1, target_steps=0.15, delayed=0.1)
+"""Half of the training episodes brake hard, where a good policy leaves the band. The rest of what a
+policy meets is rarer: a start with an empty control chamber, a target that steps, a late coil."""
 REWARD_SCALE = 0.08
 """Factor of the rewards that PPO sees [1]: the critic's errors become about as large as the actor's
 advantages, whose gradients PPO clips together."""

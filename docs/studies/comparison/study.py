@@ -17,6 +17,7 @@ from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, t
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.options import parse
 from training.commands import compare
+from training.evaluation.scenarios import BEYOND
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
@@ -29,10 +30,20 @@ CONTROLLERS = (
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""
-EPISODES, BEYOND_EPISODES, QUICK = 4096, 128, 4
-"""In each plant set, in each scenario beyond training, and under --quick."""
+EPISODES, BEYOND_EPISODES, WORN_EPISODES, QUICK = 4096, 1024, 128, 4
+"""In each plant set, in each scenario beyond training, on each worn valve, and under --quick."""
 PLANTS = "sensitive_ten_percent"
 """Plant set of the page's table and picture, and of the scenarios beyond training."""
+BEYOND_CONTROLLERS = CONTROLLERS[:4]
+"""Those of the page's table of scenarios beyond training."""
+BEYOND_COLUMNS = [
+    "scenario",
+    "controller",
+    "left_percent",
+    "left_low",
+    "left_high",
+    "C1_worst_excursion_bar",
+]
 COLUMNS = {
     "C1_worst_excursion_bar": ("worst excursion [bar]", "{:.2f}"),
     "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
@@ -61,34 +72,46 @@ def page_table(rows: pd.DataFrame) -> str:
     return table(headings, lines)
 
 
-def beyond_table(rows: pd.DataFrame) -> pd.DataFrame:
-    """Share that leaves [%]: a row for each scenario, a column for each controller."""
-    return rows.pivot(index="scenario", columns="controller", values="left_percent").loc[
-        list(dict.fromkeys(rows["scenario"])), list(dict.fromkeys(rows["controller"]))
-    ]
+def beyond_table(rows: pd.DataFrame) -> str:
+    """Share that leaves [%] and its interval: a row for each scenario, a column for each controller.
+
+    rows: of beyond.csv.
+    """
+    cells = {
+        (
+            row["scenario"],
+            row["controller"],
+        ): "{left_percent:.2g} ({left_low:.2g} to {left_high:.2g})".format(**row)
+        for row in rows.to_dict("records")
+    }
+    lines = [[name, *(cells[name, each] for each in BEYOND_CONTROLLERS)] for name in BEYOND]
+    return table(["scenario", *BEYOND_CONTROLLERS], lines)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     work = (options.out if options.quick else ROOT / "runs") / "comparison"
-    beyond = work.with_name("comparison-beyond")
-    for out in (work, beyond):
+    groups = (
+        {"beyond": BEYOND_EPISODES}
+        if options.quick
+        else {"beyond": BEYOND_EPISODES, "worn": WORN_EPISODES}
+    )
+    folders = {name: work.with_name(f"comparison-{name}") for name in groups}
+    for out in (work, *folders.values()):
         out.mkdir(parents=True, exist_ok=True)
-    episodes = (QUICK, QUICK) if options.quick else (EPISODES, BEYOND_EPISODES)
-    run_compare(work, "--episodes", episodes[0], quick=options.quick)
-    scenarios = ("beyond",) if options.quick else ("beyond", "worn")
-    run_compare(
-        beyond, "--scenarios", *scenarios, "--plants", PLANTS, "--episodes", episodes[1],
-        quick=options.quick,
-    )  # fmt: skip
+    quick = options.quick
+    run_compare(work, "--episodes", QUICK if quick else EPISODES, quick=quick)
+    for name, episodes in groups.items():
+        own = ("--scenarios", name, "--plants", PLANTS, "--episodes", QUICK if quick else episodes)
+        run_compare(folders[name], *own, quick=quick)
     for name in ("comparison.csv", "differences.csv", "comparison.png"):
         shutil.copy(work / name, options.out / name)
-    shares = beyond_table(pd.read_csv(beyond / "comparison.csv"))
-    shares.to_csv(options.out / "beyond.csv", float_format="%.3g")
+    rows = pd.concat(pd.read_csv(folder / "comparison.csv") for folder in folders.values())
+    rows[BEYOND_COLUMNS].to_csv(options.out / "beyond.csv", index=False, float_format="%.3g")
     blocks = {"controllers": page_table(pd.read_csv(work / "comparison.csv"))}
-    fill(options.out / PAGE, blocks)
-    if not options.quick:
+    fill(options.out / PAGE, {**blocks, "beyond": beyond_table(rows)})
+    if not quick:
         fill(ROOT / "README.md", blocks)
     return 0
 
