@@ -31,8 +31,11 @@ SETTLING = 0.5
 """Time of a drive after which p2 counts [s]."""
 REPEATS = 6
 """Simulations of a drive, each with its own noise."""
-DEVIATIONS = 2.0
-"""Standard deviations of the method's own error above which a difference counts."""
+OTHER_NOISE = 1_000_000
+"""First seed of the noise of what is compared with what is simulated already: a log has its own noise."""
+DEVIATIONS = 3.0
+"""Standard deviations of the method's own error above which a difference counts: of five figures one
+would often pass two by chance."""
 READING, BALANCE, CHANGE = 0.01 * BAR, 0.05 * GRAM, 2.0 * GRAM
 """Standard deviations: of p2's noise [Pa], of the shut circuit's balance [kg/s], and of the change of
 consumption in a second [kg/s]."""
@@ -122,10 +125,12 @@ def _leaking(drive: Drive, p: Mapping[str, float]) -> NDArray:
     return into - p["A_circuit"] * flux(drive.p2, p["p_env"], inverse)
 
 
-def simulated(logs: Sequence[Log], plant: Plant, controller: Controller) -> list[Log]:
+def simulated(
+    logs: Sequence[Log], plant: Plant, controller: Controller, first_seed: int = 0
+) -> list[Log]:
     """Each log as the controller would have written it on a plant.
 
-    The coil's voltage is the log's median. Raises ValueError for a drive that cannot begin in
+    The coil's voltage is the log's median. first_seed: of the sensors' noise. Raises ValueError for a drive that cannot begin in
     simulation.
     """
     logged = [drive for log in logs for drive in log.drives]
@@ -136,7 +141,7 @@ def simulated(logs: Sequence[Log], plant: Plant, controller: Controller) -> list
     options = {name: [inputs[id(drive)][name] for drive in logged] for name in INPUTS}
     on = np.concatenate([[plant.voltage], *(drive.U[drive.coil > 0] for drive in logged)])
     read = drives(
-        plant, controller, range(len(logged)), {"parameters": p, **options},
+        plant, controller, range(first_seed, first_seed + len(logged)), {"parameters": p, **options},
         voltage=float(np.median(on)) / plant.voltage,
         duration=max(len(drive.coil) for drive in logged) * period,
     )  # fmt: skip
@@ -204,7 +209,7 @@ class ClosedLoop:
     def compared(self, corrected: Plant, part: slice = slice(None)) -> Compared:
         """Against a corrected plant; a part of the drives counts."""
         after = simulated([self.log] * REPEATS, corrected, self.controller)
-        again = simulated(after, corrected, self.controller)
+        again = simulated(after, corrected, self.controller, OTHER_NOISE)
         logged, before, each, repeated = (
             np.array([figures(replace(log, drives=log.drives[part])) for log in logs])
             for logs in ([self.log], self.before, after, again)
