@@ -17,7 +17,8 @@ import numba
 import numpy as np
 from numpy.typing import ArrayLike
 
-from controllers.policy import load_policy
+from controllers.policy import TRAINED, load_policy
+from controllers.policy_files import policy_digest
 from docs.studies.blind.forms import deviating_sizes
 from docs.studies.blind.score import named_cause, named_set
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
@@ -120,7 +121,11 @@ def judged(valve: dict[str, Any], log: Path, found: dict[str, Any]) -> dict[str,
     compared, _ = openings(read_log(log), Plant.calibrated().parameters)
     drives = [int(drive_of(each.name)[len("drive-") : -len(".csv")]) for each in compared.recordings]
     first = next((drive for drive in drives if drive > valve["onset"]), 0)
-    onset = found["onset"]["drive"] if found["onset"] else f"drive-{drives[0]}.csv"
+    throughout = dict.fromkeys(("drive", "earliest", "latest"), f"drive-{drives[0]}.csv")
+    onset = found["onset"] or throughout
+    earliest, latest = (
+        int(onset[name][len("drive-") : -len(".csv")]) for name in ("earliest", "latest")
+    )
     true, named = (valve["cause"],), named_cause(found)
     return {
         "label": valve["label"],
@@ -130,7 +135,9 @@ def judged(valve: dict[str, Any], log: Path, found: dict[str, Any]) -> dict[str,
         "listed": [true] == [tuple(cause["effects"]) for cause in found["causes"][:1]],
         "right": named == true,
         "in_set": true in named_set(found),
-        "onset": onset == f"drive-{first}.csv",
+        "onset": onset["drive"] == f"drive-{first}.csv",
+        "began": [earliest, latest],
+        "between": earliest <= first <= latest,
     }
 
 
@@ -152,6 +159,8 @@ def rows(answers: Sequence[dict[str, Any]]) -> list[list[str]]:
         ["Named cause right, of those named", f"{len(right)} of {len(named)}"],
         ["Truth in the set, of those named", f"{sum(e['in_set'] for e in named)} of {len(named)}"],
         ["First drive right, where the cause is", f"{sum(e['onset'] for e in right)} of {len(right)}"],
+        ["First drive between those given with 95 %, where the cause is",
+         f"{sum(e['between'] for e in right)} of {len(right)}"],
     ]  # fmt: skip
 
 
@@ -161,7 +170,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--valves", type=COUNT, default=VALVES)
     options = study_options(parser, arguments)
     numbers, drives = ([2], QUICK) if options.quick else (range(options.valves), DRIVES)
-    subject = {"seed": SEED, "drives": drives, "effects": [effect.name for effect in EFFECTS]}
+    effects, policy = [effect.name for effect in EFFECTS], policy_digest(TRAINED)
+    subject = {"seed": SEED, "drives": drives, "effects": effects, "policy": policy}
     journal, answers = Journal(options.out / "valves.jsonl", subject), []
     for number in numbers:
         if str(number) not in journal:
