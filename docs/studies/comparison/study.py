@@ -30,21 +30,18 @@ CONTROLLERS = (
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""
-EPISODES, BEYOND_EPISODES, WORN_EPISODES, QUICK = 4096, 1024, 128, 4
-"""In each plant set, in each scenario beyond training, on each worn valve, and under --quick."""
+EPISODES, GROUPS, QUICK = 4096, {"beyond": 1024, "worn": 128}, 4
+"""Episodes in each plant set, in each scenario of a group, and under --quick."""
 PLANTS = "sensitive_ten_percent"
 """Plant set of the page's table and picture, and of the scenarios beyond training."""
 BEYOND_CONTROLLERS = CONTROLLERS[:4]
 """Those in scenarios beyond training and on worn valves: what a control unit can run, but PWM, which
 leaves the band in ordinary episodes."""
 BEYOND_COLUMNS = [
-    "scenario",
-    "controller",
-    "left_percent",
-    "left_low",
-    "left_high",
-    "C1_worst_excursion_bar",
-]
+    "scenario", "controller", "left_percent", "left_low", "left_high", "C1_worst_excursion_bar",
+]  # fmt: skip
+SHARE = "{left_percent:.2g} ({left_low:.2g} to {left_high:.2g})"
+"""Share that leaves the band, with its interval [%]."""
 COLUMNS = {
     "C1_worst_excursion_bar": ("worst excursion [bar]", "{:.2f}"),
     "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
@@ -66,9 +63,8 @@ def page_table(rows: pd.DataFrame) -> str:
     """The page's table. rows: of comparison.csv."""
     lines = []
     for row in rows.query("plants == @PLANTS").to_dict("records"):
-        share = f"{row['left_percent']:.2g} ({row['left_low']:.2g} to {row['left_high']:.2g})"
         cells = [form.format(row[column]) for column, (_, form) in COLUMNS.items()]
-        lines.append([str(row["controller"]), share, *cells])
+        lines.append([str(row["controller"]), SHARE.format(**row), *cells])
     headings = ["controller", "leaves ±500 mbar [%]", *(heading for heading, _ in COLUMNS.values())]
     return table(headings, lines)
 
@@ -78,14 +74,9 @@ def beyond_table(rows: pd.DataFrame) -> str:
 
     rows: of beyond.csv.
     """
-    cells = {
-        (
-            row["scenario"],
-            row["controller"],
-        ): "{left_percent:.2g} ({left_low:.2g} to {left_high:.2g})".format(**row)
-        for row in rows.to_dict("records")
-    }
-    lines = [[name, *(cells[name, each] for each in BEYOND_CONTROLLERS)] for name in BEYOND]
+    share = rows.assign(text=[SHARE.format(**row) for row in rows.to_dict("records")])
+    wide = share.pivot(index="scenario", columns="controller", values="text")
+    lines = [[name, *wide.loc[name, [*BEYOND_CONTROLLERS]]] for name in BEYOND]
     return table(["scenario", *BEYOND_CONTROLLERS], lines)
 
 
@@ -93,22 +84,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
     work = (options.out if options.quick else ROOT / "runs") / "comparison"
-    groups = (
-        {"beyond": BEYOND_EPISODES}
-        if options.quick
-        else {"beyond": BEYOND_EPISODES, "worn": WORN_EPISODES}
-    )
-    folders = {name: work.with_name(f"comparison-{name}") for name in groups}
-    for out in (work, *folders.values()):
-        out.mkdir(parents=True, exist_ok=True)
-    quick = options.quick
+    quick, beyond = options.quick, []
+    work.mkdir(parents=True, exist_ok=True)
     run_compare(work, CONTROLLERS, "--episodes", QUICK if quick else EPISODES, quick=quick)
-    for name, episodes in groups.items():
-        own = ("--scenarios", name, "--plants", PLANTS, "--episodes", QUICK if quick else episodes)
-        run_compare(folders[name], BEYOND_CONTROLLERS, *own, quick=quick)
+    for name, episodes in ({"beyond": QUICK} if quick else GROUPS).items():
+        folder = work.with_name(f"comparison-{name}")
+        folder.mkdir(parents=True, exist_ok=True)
+        own = ("--scenarios", name, "--plants", PLANTS, "--episodes", episodes)
+        run_compare(folder, BEYOND_CONTROLLERS, *own, quick=quick)
+        beyond.append(pd.read_csv(folder / "comparison.csv"))
     for name in ("comparison.csv", "differences.csv", "comparison.png"):
         shutil.copy(work / name, options.out / name)
-    rows = pd.concat(pd.read_csv(folder / "comparison.csv") for folder in folders.values())
+    rows = pd.concat(beyond)
     rows[BEYOND_COLUMNS].to_csv(options.out / "beyond.csv", index=False, float_format="%.3g")
     blocks = {"controllers": page_table(pd.read_csv(work / "comparison.csv"))}
     fill(options.out / PAGE, {**blocks, "beyond": beyond_table(rows)})
