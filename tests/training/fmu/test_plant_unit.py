@@ -271,14 +271,10 @@ def test_an_emptied_circuit_ends_the_run_in_a_sentence(unit):
     assert instance.start().step(1e-3, U=24.0, sigma_S=0.0) == OK
 
 
-@pytest.mark.parametrize("inputs", [{"U": 1e300}, {"force_MV": 1e300}, {"p1_slope": -1e300}])
-def test_no_output_of_a_step_that_succeeds_is_infinite_or_nan(unit, inputs):
-    instance = Instance(unit).start({"G_eddy": 4e-3})
-    for _ in range(5):
-        if instance.step(1e-3, **inputs) != OK:
-            assert "check that the inputs are physical" in instance.said[-1]
-            return
-        assert np.all(np.isfinite(instance.get(*unit.references)))
+def test_a_step_to_numbers_beyond_double_precision_fails(unit):
+    instance = Instance(unit).start()
+    assert instance.step(1e-3, U=1e155) == ERROR
+    assert "check that the inputs are physical" in instance.said[-1]
 
 
 def test_a_finite_reservoir_sags(unit):
