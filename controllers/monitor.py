@@ -136,8 +136,8 @@ class MonitorModel:
         if len(self.components) != effects:
             raise ValueError(f"{len(self.components)} components for {effects} effects")
         for name in (*self.effects, *self.components):
-            if not (name.isascii() and name.isidentifier()):
-                raise ValueError(f"{name[:40]!r} is no name: letters, digits and _ make one")
+            if not (name.isascii() and name.isidentifier()) or name in (UNKNOWN, RETURN):
+                raise ValueError(f"{name[:40]!r} is no name: letters, digits and _ make one of its own")
 
 
 class _File(msgspec.Struct):

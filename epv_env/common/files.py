@@ -135,7 +135,7 @@ def read_json(path: str | PathLike[str], shape: type[Shape], *, version: str, re
     content = decoded(path, remedy=remedy)
     found = content.get("format") if isinstance(content, dict) else None
     if found != version:
-        raise JSONFileError(f"{path} has format {found!r}, this version reads {version!r}: {remedy}")
+        raise JSONFileError(f"{path} has format {found!r:.40}, this version reads {version!r}: {remedy}")
     return checked(content, shape, where=str(path), remedy=remedy)
 
 

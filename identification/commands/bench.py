@@ -48,10 +48,10 @@ def run(options: Options) -> None:
     else:
         programmes = at_voltage(SUITES[options.suite], plant.voltage)
     campaign = run_bench(programmes, truth, seed=options.seed, rate=options.rate, rules=rules_of(plant))
-    write_campaign(campaign, options.out)
     if options.truth is not None:
         itself = {"parameters": truth, "region": Region(centre=truth), "diagnosis": None}
         save_plant(replace(plant, **itself, name="truth", provenance={}), options.truth)
+    write_campaign(campaign, options.out)  # campaign.json last: whoever finds it has the truth, too
     print(f"{len(campaign.recordings)} recordings in {options.out}")
     if options.programme:
         print("to add them to another campaign, see docs/how-to/diagnose-a-gap.md")

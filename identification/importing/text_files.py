@@ -9,7 +9,7 @@ import io
 import re
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import takewhile
+from itertools import islice, takewhile
 from pathlib import Path
 from typing import Any
 
@@ -34,10 +34,13 @@ MARKS = (
 )
 """Byte order marks with their encodings."""
 
-COMMENT = re.compile(r"\s*(#(?!NV|N/A)|%|//|!)")
+COMMENT = re.compile(r"\s*(#(?!NV|N/A|DIV|VAL|WERT)|%|//|!)")
 """Beginning of a line that holds no data."""
 
-MISSING = ("NULL", "null", "None", "#NV", "#N/A", "N/A", "n/a", "NA", "-", "--", "---")
+MISSING = (
+    "NULL", "null", "None", "#NV", "#N/A", "N/A", "n/a", "n.a.", "NA", "NAN", "-", "--", "---", "***",
+    "1.#QNAN", "-1.#IND", "1.#INF", "-1.#INF", "#DIV/0!", "#VALUE!", "#WERT!",
+)  # fmt: skip
 """Cells that hold no reading, beside empty ones, NaN and Inf."""
 
 COMMENT_COLUMN, UNIT_LABEL, X_COLUMN = "comment", "Y_Unit_Label", "X_Value"
@@ -191,7 +194,9 @@ def _header(
             "it is text or was cut off"
         )
     rows = (cells_of(line, separator) for _, line in lines)
-    higher = list(takewhile(lambda cells: not is_row(cells), rows))
+    top = (cells_of(line, separator) for _, line in lines[:SAMPLE])
+    named = next((k for k, row in enumerate(top) if sum(meaning(c) is not None for c in row) > 1), 0)
+    higher = [*islice(rows, named), *takewhile(lambda cells: not is_row(cells), rows)]
     first, ends_empty = len(higher), not any(cells[-1] for cells in data)
     above = [row for cells in higher for row in _as_wide(cells, width, ends_empty)]
     if not above:

@@ -16,6 +16,8 @@ ISO = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d")
 DATE = re.compile(r"\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.](\d{4}|\d\d)")
 """A date alone. A day comes first before dots, a month before slashes; only differences count."""
 
+DAY_FIRST = re.compile(r"\d\d?\.|(1[3-9]|[23]\d)[-/]")
+
 CLOCK = re.compile(r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?)(?:\s?([AaPp])\.?[Mm]\.?)?")
 """A time of day, perhaps with AM or PM."""
 
@@ -68,7 +70,7 @@ def _local_points(cells: pd.Series) -> NDArray:
     twelve = half.notna().to_numpy()
     time[twelve] = time[twelve] % HALF_DAY + half.str.lower().eq("p").to_numpy()[twelve] * HALF_DAY
     if date.notna().any():
-        days = {text: pd.to_datetime(text, dayfirst="." in text) for text in date.dropna().unique()}
+        days = {t: pd.to_datetime(t, dayfirst=bool(DAY_FIRST.match(t))) for t in date.dropna().unique()}
         return date.map(days).to_numpy("M8[ns]") + time
     known = ~np.isnat(time)
     time[known] = np.unwrap(

@@ -251,6 +251,8 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
     level = float(np.median(U[start]))
     if switches(U) and not np.any(on):
         yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
+    if switches(current) and not np.any(on):
+        yield f"I switches at {np.max(np.abs(current)):.4g} A, and the voltage at none"
     if not on[0] and abs(level) > rules.sensors["U"].margin:
         yield f"the voltage is {level:.4g} V, neither off nor on"
     settled = current[start]

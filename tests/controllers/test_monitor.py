@@ -376,7 +376,7 @@ def test_numbers_out_of_range_get_one_sentence(name, value, said, tmp_path: Path
 
 
 @pytest.mark.parametrize(
-    "name", ["", "a b", 'x"};\nint own(void) { return 0; }', "é", "2nd", "a" * 3 + "*/"]
+    "name", ["", "a b", 'x"};\nint own(void) { return 0; }', "é", "2nd", "aaa*/", "return", "unknown"]
 )
 @pytest.mark.parametrize("which", ["effects", "components"])
 def test_a_name_that_is_none_is_refused(which, name, tmp_path: Path) -> None:

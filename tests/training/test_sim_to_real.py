@@ -2,6 +2,8 @@
 
 import json
 import math
+import os
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,6 +17,8 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.region import Region
 from identification.commands import bench
+from identification.recordings.campaign_files import read_campaign
+from training.commands import sim_to_real
 from training.commands.sim_to_real import MEASURED, SIMULATED, gap_table, trained
 from training.evaluation.scenarios import EVALUATION
 from training.studies.comparison import SCORES, compare
@@ -98,6 +102,27 @@ def test_what_is_finished_is_kept(finished):
     assert len(before) >= 6
     assert run_loop(finished, "--effect", "command_delay=0.006") == 0
     assert times() == before
+
+
+@pytest.mark.parametrize("last", ["plant.json", "campaign.json"])
+def test_a_bench_that_was_killed_between_its_files_records_anew(last, tmp_path, monkeypatch):
+    replace = os.replace
+
+    def killed(source, target):
+        replace(source, target)
+        if Path(target).name == last:
+            raise KeyboardInterrupt
+
+    def stopped(*_):
+        raise KeyboardInterrupt
+
+    for owner, name, value in ((os, "replace", killed), (sim_to_real, "deployed", stopped)):
+        with monkeypatch.context() as patch:
+            patch.setattr(owner, name, value)
+            with pytest.raises(KeyboardInterrupt):
+                run_loop(tmp_path)
+    assert (tmp_path / "withheld" / "plant.json").exists()
+    assert len(read_campaign(tmp_path / "campaign").recordings) == 6
 
 
 def test_another_effect_is_refused_wherever_the_first_was_stopped(tmp_path, monkeypatch, capsys):

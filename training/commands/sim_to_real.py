@@ -33,6 +33,7 @@ from epv_env.reward import RewardWeights
 from identification.bench.programmes import SUITES
 from identification.commands import bench
 from identification.gap.report.gap_json import GAP
+from identification.recordings.campaign_files import FILE_NAME
 from training.evaluation.named import named_controllers
 from training.evaluation.plots import COLOURS, plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
@@ -103,7 +104,7 @@ def run(options: Options) -> None:
     )  # fmt: skip
     bench.true_parameters(recording, load_plant(None))  # refuses an effect that cannot be used
     write_options(out, settings)  # before what it belongs to: a run may stop anywhere
-    if not (out / WITHHELD).exists():
+    if not ((out / WITHHELD).exists() and (out / CAMPAIGN / FILE_NAME).exists()):
         bench.run(recording)
     print("[2 of 4: train on the nominal plant, deploy]", file=sys.stderr)
     results = deployed(BEFORE, load_plant(None), options)

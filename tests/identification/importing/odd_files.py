@@ -126,7 +126,7 @@ def multi(at: Path, true: Recording, begin: str = "Time" + 5 * "\t10:00:00.0") -
 def words(at: Path, true: Recording) -> Path:
     """Some cells hold a word for a missing reading, and some rows a decimal comma among points."""
     lines = rows(at, true, [BRACKETED]).read_text().splitlines()
-    for k, word in enumerate(["NaN", "NULL", "#NV", "---", "Inf", ""]):
+    for k, word in enumerate(["NaN", "NULL", "#NV", "---", "Inf", "", "1.#INF", "#DIV/0!"]):
         cells = lines[20 + 40 * k].split(";")
         lines[20 + 40 * k] = ";".join([*cells[:3], word, *cells[4:]])  # p1, which is steady
         lines[21 + 40 * k] = lines[21 + 40 * k].replace(".", ",")
@@ -196,7 +196,7 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
         at,
         r,
         [
-            "Trace;;;;;",
+            "2026-03-01;10:00:00;;;;",
             ";".join(["Time", *NAMES[1:]]),
             5 * "REAL;" + "REAL",
             ";".join(UNITS),
@@ -291,6 +291,10 @@ REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
     "text below the numbers": (lambda at, r: rows(at, r, [BRACKETED], last="\nstopped by hand\n"), CUT),
     "a record that begins again": (restarted, "time does not increase after .*: cut the recording"),
     "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
+    "a time of day in seconds": (
+        lambda at, r: timed(at, r, clock(r, "%H:%M:%S")),
+        "does not increase .* with more digits",
+    ),
     "a text called MDF": (lambda at, r: written(at.with_suffix(".mf4"), "a"), "not begin as MDF does"),
     "a folder": (lambda at, r: folder(at), "is a folder: give the path of a measurement file"),
     "a file above the limit": (lambda at, r: huge(at), "is larger than .* bytes"),

@@ -4,6 +4,7 @@ import json
 import re
 import struct
 import zlib
+from pathlib import Path
 
 import h5py
 import numpy as np
@@ -14,7 +15,7 @@ import pytest
 from identification.importing.binary_files import read_matlab, read_parquet
 from identification.importing.import_campaign import read_files, read_source, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
-from identification.importing.source_file import ImportingError
+from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
 from tests.identification.importing.dialects import bench, columns_of, mat5, tdms, text
 from tests.identification.importing.odd_files import (
     NAMES,
@@ -84,6 +85,12 @@ def test_all_names_of_two_groups_are_in_one_mapping(true, tmp_path):
     (tmp_path / "map.json").write_text(str(error.value).partition(" such as ")[2])
     made = read_files([path], mapping=tmp_path / "map.json", ambient_bar=1.0).campaign
     np.testing.assert_allclose(made.recordings[0].p2, true.p2, rtol=0, atol=1e-6)
+
+
+def test_a_channel_without_readings_is_shown_as_empty():
+    channel = SourceChannel(name="p2", unit="bar", values=np.zeros(0), time=np.zeros(0))
+    source = SourceFile(path=Path("run.mf4"), format="MDF", sha256="", channels=(channel,))
+    assert "p2  bar empty" in source_table(source)
 
 
 def test_one_name_in_two_groups_is_chosen_by_its_group(true, tmp_path):

@@ -254,17 +254,24 @@ def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tm
         read_log(tmp_path)
 
 
-def test_a_sensor_that_fails_on_the_way_is_left_to_the_diagnosis(often_opened, tmp_path):
-    """A current of 0.1 A without a voltage: from the second drive on a fault, in all drives refused."""
-    text, offset = (often_opened / "drive-1.csv").read_text(), scaled("I_A", 1.0, 0.1)
+@pytest.mark.parametrize(
+    ("failed", "told"),
+    [
+        (scaled("I_A", 1.0, 0.1), "A flows while the coil is off"),
+        (scaled("I_A", 0.0), "make inf ohm, .*: check unit, sign and sensor"),
+    ],
+)
+def test_a_sensor_that_fails_on_the_way_is_left_to_the_diagnosis(failed, told, often_opened, tmp_path):
+    """A current without a voltage, or none: from the second drive on a fault, in all drives refused."""
+    text = (often_opened / "drive-1.csv").read_text()
     content = json.loads((often_opened / "log.json").read_text())
     content["drives"] = [{"file": name} for name in ("drive-1.csv", "drive-2.csv")]
     (tmp_path / "log.json").write_text(json.dumps(content))
     (tmp_path / "drive-1.csv").write_text(text)
-    (tmp_path / "drive-2.csv").write_text(offset(text))
+    (tmp_path / "drive-2.csv").write_text(failed(text))
     assert len(read_log(tmp_path).drives) == 2
-    (tmp_path / "drive-1.csv").write_text(offset(text))
-    with pytest.raises(CampaignError, match=r"drive-1.csv, line .*A flows while the coil is off"):
+    (tmp_path / "drive-1.csv").write_text(failed(text))
+    with pytest.raises(CampaignError, match=rf"drive-1.csv, line .*{told}"):
         read_log(tmp_path)
 
 

@@ -133,8 +133,8 @@ static int component_step(component *c, double time, double step)
     const char *fault;
     if (!component_may(c, "a step", 1u << RUNNING))
         return 0;
-    if (!(step > 0.0) || !isfinite(step))
-        return refuse(c, "the step is %g s: give a positive, finite length", step);
+    if (!(step > 0.0 && step <= 3600.0))
+        return refuse(c, "the step is %g s: give a positive length of at most an hour", step);
     if (!(fabs(time - c->now.time) <= 1e-9 * (1.0 + fabs(c->now.time)) + 1e-3 * step))
         return refuse(c, "the step begins at %g s but the unit is at %g s: continue where the last "
                       "step ended", time, c->now.time);

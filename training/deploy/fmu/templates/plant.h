@@ -170,6 +170,16 @@ static double step(State *q, const conditions *on, double remaining, double *hin
     return h;
 }
 
+static int finite(const State *q)
+{
+    const double *number = (const double *)q;
+    size_t k;
+    for (k = 0; k < sizeof *q / sizeof *number; k++)
+        if (!isfinite(number[k]))
+            return 0;
+    return 1;
+}
+
 /* Apply the conditions for a time [s]. Returns whether the state is still physical. */
 static int advance(State *q, const conditions *on, double remaining)
 {
@@ -180,8 +190,7 @@ static int advance(State *q, const conditions *on, double remaining)
             return 0;
         remaining -= step(q, on, remaining, &hint, &located);
     }
-    /* All are false for not-a-number, too. */
-    return q->p1 > 0.0 && q->p2 > 0.0 && q->p2 + q->far_pressure > 0.0 && q->p3 > 0.0;
+    return finite(q) && q->p1 > 0.0 && q->p2 > 0.0 && q->p2 + q->far_pressure > 0.0 && q->p3 > 0.0;
 }
 
 static void publish(model *m)
@@ -214,12 +223,7 @@ $start
 /* Whether all numbers of a state from outside are finite. */
 static int model_is_sound(const model *m)
 {
-    const double *state = (const double *)&m->q;
-    size_t k;
-    for (k = 0; k < sizeof m->q / sizeof *state; k++)
-        if (!isfinite(state[k]))
-            return 0;
-    return isfinite(m->acting_U) && m->delay_left >= 0.0 && isfinite(m->delay_left);
+    return finite(&m->q) && isfinite(m->acting_U) && m->delay_left >= 0.0 && isfinite(m->delay_left);
 }
 
 /* Apply the inputs for a time [s]; the coil follows its voltage after the command delay. */
