@@ -32,7 +32,7 @@ SETTLING = 0.5
 REPEATS = 6
 """Simulations of a drive, each with its own noise."""
 OTHER_NOISE = 1_000_000
-"""First seed of the noise of what is compared with what is simulated already: a log has its own noise."""
+"""First seed of the noise of what is compared with simulations: a log has its own noise."""
 DEVIATIONS = 3.0
 """Standard deviations of the method's own error above which a difference counts: of five figures one
 would often pass two by chance."""
@@ -130,8 +130,8 @@ def simulated(
 ) -> list[Log]:
     """Each log as the controller would have written it on a plant.
 
-    The coil's voltage is the log's median. first_seed: of the sensors' noise. Raises ValueError for a drive that cannot begin in
-    simulation.
+    The coil's voltage is the log's median. first_seed: of the sensors' noise. Raises ValueError for a
+    drive that cannot begin in simulation.
     """
     logged = [drive for log in logs for drive in log.drives]
     period, count = logs[0].period, len(logs[0].drives)
@@ -140,8 +140,9 @@ def simulated(
     inputs = {key: _inputs(drive, period, p) for key, drive in unique.items()}
     options = {name: [inputs[id(drive)][name] for drive in logged] for name in INPUTS}
     on = np.concatenate([[plant.voltage], *(drive.U[drive.coil > 0] for drive in logged)])
+    seeds = range(first_seed, first_seed + len(logged))
     read = drives(
-        plant, controller, range(first_seed, first_seed + len(logged)), {"parameters": p, **options},
+        plant, controller, seeds, {"parameters": p, **options},
         voltage=float(np.median(on)) / plant.voltage,
         duration=max(len(drive.coil) for drive in logged) * period,
     )  # fmt: skip
