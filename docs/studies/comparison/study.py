@@ -70,13 +70,16 @@ def page_table(rows: pd.DataFrame) -> str:
 
 
 def beyond_table(rows: pd.DataFrame) -> str:
-    """Share that leaves [%] and its interval: a row for each scenario, a column for each controller.
+    """Share that leaves [%]: a row for each scenario, a column for each controller, and the interval of
+    the first one's.
 
     rows: of beyond.csv.
     """
     share = rows.assign(text=[SHARE.format(**row) for row in rows.to_dict("records")])
     wide = share.pivot(index="scenario", columns="controller", values="text")
-    lines = [[name, *wide.loc[name, [*BEYOND_CONTROLLERS]]] for name in BEYOND]
+    first, *others = BEYOND_CONTROLLERS
+    plain = wide[others].apply(lambda column: column.str.split(" ").str[0])
+    lines = [[name, wide.loc[name, first], *plain.loc[name]] for name in BEYOND]
     return table(["scenario", *BEYOND_CONTROLLERS], lines)
 
 
