@@ -137,7 +137,7 @@ class MonitorModel:
             raise ValueError(f"{len(self.components)} components for {effects} effects")
         for name in (*self.effects, *self.components):
             if not (name.isascii() and name.isidentifier()) or name in (UNKNOWN, RETURN):
-                raise ValueError(f"{name[:40]!r} is no name: letters, digits and _ make one of its own")
+                raise ValueError(f"{name[:40]!r} is no name: give one of letters, digits and _")
 
 
 class _File(msgspec.Struct):

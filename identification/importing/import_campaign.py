@@ -223,13 +223,14 @@ def source_table(source: SourceFile) -> str:
     rows = []
     for channel in source.channels:
         known, time = channel.known, channel.time
-        timed = time is not None and time.size and np.ptp(time) > 0
         rows.append(
             {
                 "channel": source.label(channel),
                 "unit": channel.unit,
                 "range": f"{np.min(known):.5g} to {np.max(known):.5g}" if len(known) else "empty",
-                "rate": f"{usual_rate(time):.6g} Hz" if time is not None and timed else "",
+                "rate": f"{usual_rate(time):.6g} Hz"
+                if time is not None and time.size and np.ptp(time) > 0
+                else "",
                 "proposed": meaning(channel.name, channel.unit) or "",
             }
         )

@@ -14,9 +14,10 @@ ISO = re.compile(r"\d{4}-?\d\d-?\d\d[T ]\d\d")
 """Beginning of a date with a time of day (ISO 8601); a blank may stand for T."""
 
 DATE = re.compile(r"\d{4}[-/.]\d\d?[-/.]\d\d?|\d\d?[-/.]\d\d?[-/.](\d{4}|\d\d)")
-"""A date alone. A day comes first before dots, a month before slashes; only differences count."""
+"""A date alone. Only differences count."""
 
 DAY_FIRST = re.compile(r"\d\d?\.|(1[3-9]|[23]\d)[-/]")
+"""Beginning of a date with the day before the month: a dot follows, or no month is so late."""
 
 CLOCK = re.compile(r"(\d\d?:\d\d:\d\d(?:[.,]\d+)?)(?:\s?([AaPp])\.?[Mm]\.?)?")
 """A time of day, perhaps with AM or PM."""

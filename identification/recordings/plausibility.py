@@ -252,7 +252,7 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
     if switches(U) and not np.any(on):
         yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
     if switches(current) and not np.any(on):
-        yield f"I switches at {np.max(np.abs(current)):.4g} A, and the voltage at none"
+        yield f"I switches at {np.max(np.abs(current)):.4g} A, and the voltage never does"
     if not on[0] and abs(level) > rules.sensors["U"].margin:
         yield f"the voltage is {level:.4g} V, neither off nor on"
     settled = current[start]

@@ -239,18 +239,8 @@ def test_a_diagnosis_that_differs_is_explained() -> None:
     assert "does not name second, which recalibration" in said()
     content |= {"ambiguity_set": [["second"]], "verdict": "known"}
     assert "has second begin in drive-1.csv, not drive-2.csv" in said()
-    content["causes"] = [
-        {
-            "effects": ["second"],
-            "onset": {
-                "second (x)": {
-                    "drive": "drive-2.csv",
-                    "earliest": "drive-2.csv",
-                    "latest": "drive-2.csv",
-                }
-            },
-        }
-    ]
+    onset = dict.fromkeys(("drive", "earliest", "latest"), "drive-2.csv")
+    content["causes"] = [{"effects": ["second"], "onset": {"second (x)": onset}}]
     assert said() == "The diagnosis agrees: known."
     content["ambiguity_set"] = [["first"]]
     assert "names first, which acts in all drives" in said()

@@ -156,9 +156,9 @@ def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: _Findi
         f"{_unnamed(changes[name], name, named, content)}"
         for name in sorted(seen - named)
     ]
+    files = [drive.file for drive in log.drives]
     for name in sorted(named & seen):
-        own, files = _began(changes[name], log, ends)[0], [drive.file for drive in log.drives]
-        other = _drive_with(name, content, files[0])
+        own, other = _began(changes[name], log, ends)[0], _drive_with(name, content, files[0])
         if not files.index(other["earliest"]) <= files.index(own) <= files.index(other["latest"]):
             said.append(
                 f"has {name} begin in {other['drive']}, not {own}: it weighs whole drives, not openings"

@@ -70,16 +70,15 @@ def page_table(rows: pd.DataFrame) -> str:
 
 
 def beyond_table(rows: pd.DataFrame) -> str:
-    """Share that leaves [%]: a row for each scenario, a column for each controller, and the interval of
-    the first one's.
+    """Share that leaves [%]: a row for each scenario, a column for each controller. The policy's has its
+    interval.
 
     rows: of beyond.csv.
     """
-    share = rows.assign(text=[SHARE.format(**row) for row in rows.to_dict("records")])
-    wide = share.pivot(index="scenario", columns="controller", values="text")
-    first, *others = BEYOND_CONTROLLERS
-    plain = wide[others].apply(lambda column: column.str.split(" ").str[0])
-    lines = [[name, wide.loc[name, first], *plain.loc[name]] for name in BEYOND]
+    forms = dict.fromkeys(BEYOND_CONTROLLERS, "{left_percent:.2g}") | {CONTROLLERS[0]: SHARE}
+    cells = [forms[row["controller"]].format(**row) for row in rows.to_dict("records")]
+    wide = rows.assign(cell=cells).pivot(index="scenario", columns="controller", values="cell")
+    lines = [[name, *wide.loc[name, list(BEYOND_CONTROLLERS)]] for name in BEYOND]
     return table(["scenario", *BEYOND_CONTROLLERS], lines)
 
 

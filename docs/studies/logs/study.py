@@ -119,13 +119,11 @@ def answer(valve: dict[str, Any], folder: Path) -> dict[str, Any]:
 def judged(valve: dict[str, Any], log: Path, found: dict[str, Any]) -> dict[str, Any]:
     """The content of gap.json beside the truth; log: the folder, for the drives that have openings."""
     compared, _ = openings(read_log(log), Plant.calibrated().parameters)
-    drives = [int(drive_of(each.name)[len("drive-") : -len(".csv")]) for each in compared.recordings]
-    first = next((drive for drive in drives if drive > valve["onset"]), 0)
-    throughout = dict.fromkeys(("drive", "earliest", "latest"), f"drive-{drives[0]}.csv")
-    onset = found["onset"] or throughout
-    earliest, latest = (
-        int(onset[name][len("drive-") : -len(".csv")]) for name in ("earliest", "latest")
-    )
+    drives = list(dict.fromkeys(drive_of(each.name) for each in compared.recordings))
+    number = {f"drive-{k + 1}.csv": k for k in range(len(valve["seeds"]))}
+    first = next((number[drive] for drive in drives if number[drive] >= valve["onset"]), -1)
+    onset = found["onset"] or dict.fromkeys(("drive", "earliest", "latest"), drives[0])
+    began, earliest, latest = (number[onset[name]] for name in ("drive", "earliest", "latest"))
     true, named = (valve["cause"],), named_cause(found)
     return {
         "label": valve["label"],
@@ -135,8 +133,7 @@ def judged(valve: dict[str, Any], log: Path, found: dict[str, Any]) -> dict[str,
         "listed": [true] == [tuple(cause["effects"]) for cause in found["causes"][:1]],
         "right": named == true,
         "in_set": true in named_set(found),
-        "onset": onset["drive"] == f"drive-{first}.csv",
-        "began": [earliest, latest],
+        "onset": began == first,
         "between": earliest <= first <= latest,
     }
 

@@ -41,22 +41,19 @@ def compared_models(diagnosis: Diagnosis) -> dict[str, list[NDArray]]:
 def comparison_figure(diagnosis: Diagnosis, *, every_channel: bool = False) -> Figure:
     """Measured against modelled, before and after, and both errors, on a held-out run.
 
-    In three of four other ones the two models differ less: a cause acts in some runs only.
-    every_channel: False for the one in which they differ most.
+    It is of the quarter in which the two models differ most, since a cause may act in some runs only.
+    every_channel: False for the channel in which they differ most.
     """
     plant, models = diagnosis.ranking.problem.plant, compared_models(diagnosis)
     before, after = models.values()
-    changes = {
-        r: np.mean((before[r] - after[r]) ** 2, axis=1)
-        for r, run in enumerate(plant.runs)
-        if run.held_out
-    }
-    runs = sorted(changes, key=lambda r: float(np.mean(changes[r])))
+    changes = [np.mean((b - a) ** 2, axis=1) for b, a in zip(before, after, strict=True)]
+    runs = [r for r, run in enumerate(plant.runs) if run.held_out]
+    runs.sort(key=lambda r: float(np.mean(changes[r])))
     r = runs[3 * len(runs) // 4]
-    run, worst = plant.runs[r], int(np.argmax(changes[r]))
+    run, most = plant.runs[r], int(np.argmax(changes[r]))
     rows: dict[str, dict[str, NDArray]] = {}
     for c, channel in enumerate(plant.channels):
-        if not every_channel and c != worst:
+        if not every_channel and c != most:
             continue
         unit = f"[{channel.unit}]" if channel.unit else ""
         measured = np.where(run.trusted[c], run.measured[c], np.nan) / channel.scale

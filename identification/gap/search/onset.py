@@ -12,15 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import softmax
 
+from identification.block_bootstrap import LEVEL
 from identification.gap.fit.variable_projection import LinearisedRun, eliminated, normal_equations
 from identification.gap.search.posterior import log_likelihoods, tolerated_misfit
 from identification.gap.search.screening import CauseSignature, with_changes
 
 KINDS = {"whole": 0.5, "late": 0.4, "mended": 0.1}
 """Probability before the data that a cause acts in all drives, from a later one on, or ends [1]."""
-
-CONFIDENCE = 0.95
-"""Probability that a cause begins between the drives that are given [1]."""
 
 
 @dataclass(frozen=True)
@@ -34,8 +32,8 @@ class Onset:
     mended: str | None
     """File of the first drive after them; None where it acts to the end."""
     earliest: str
-    """The first drive lies between this file and `latest` with the probability CONFIDENCE: it may be one
-    that shows the cause too little, or has no openings."""
+    """The first drive lies between this file and `latest` with the probability LEVEL: a drive with few
+    openings, or none, hardly shows whether the cause acts in it."""
     latest: str
 
 
@@ -52,15 +50,15 @@ class Span:
     whole: bool
     """Whether these are all drives of the log."""
     first_between: tuple[int, int]
-    """Least and largest number of the first drive with the probability CONFIDENCE."""
+    """Least and largest number of the first drive with the probability LEVEL."""
 
     def onset(self, drives: Sequence[str]) -> Onset | None:
         """In words; None where the cause acts in all drives."""
+        if self.whole:
+            return None
         mended = drives[self.end] if self.end < len(drives) else None
         earliest, latest = (drives[number] for number in self.first_between)
-        return (
-            None if self.whole else Onset(drives[self.first], self.probability, mended, earliest, latest)
-        )
+        return Onset(drives[self.first], self.probability, mended, earliest, latest)
 
 
 def spans_of_causes(
@@ -138,10 +136,10 @@ def likeliest_span(
     # A drive without fitted openings makes ties: the shortest span has what shows the cause.
     lengths = [end - first for first, end in spans]
     best = min(range(len(spans)), key=lambda k: (-round(float(chances[k]), 6), lengths[k]))
-    first = np.bincount([begin for begin, _ in spans], weights=chances, minlength=count)
-    order = np.argsort(-first, kind="stable")
-    likely = order[: 1 + np.searchsorted(np.cumsum(first[order]), CONFIDENCE)]
-    between = (int(min(likely.min(), spans[best][0])), int(max(likely.max(), spans[best][0])))
+    of_first = np.bincount([first for first, _ in spans], weights=chances, minlength=count)
+    order = np.argsort(-of_first, kind="stable")
+    likely = [spans[best][0], *order[: 1 + np.searchsorted(np.cumsum(of_first[order]), LEVEL)]]
+    between = (int(min(likely)), int(max(likely)))
     return Span(*spans[best], float(chances[best]), kinds[best] == "whole", between)
 
 
