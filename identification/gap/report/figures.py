@@ -41,16 +41,16 @@ def compared_models(diagnosis: Diagnosis) -> dict[str, list[NDArray]]:
 def comparison_figure(diagnosis: Diagnosis, *, every_channel: bool = False) -> Figure:
     """Measured against modelled, before and after, and both errors, on a held-out run.
 
-    It is of the quarter in which the two models differ most, since a cause may act in some runs only.
-    every_channel: False for the channel in which they differ most.
+    It is of the quarter that the correction improves most, since a cause may act in some runs only.
+    every_channel: False for the channel that it improves most.
     """
     plant, models = diagnosis.ranking.problem.plant, compared_models(diagnosis)
     before, after = models.values()
-    changes = [np.mean((b - a) ** 2, axis=1) for b, a in zip(before, after, strict=True)]
+    gains = [np.mean(b**2 - a**2, axis=1) for b, a in zip(before, after, strict=True)]
     runs = [r for r, run in enumerate(plant.runs) if run.held_out]
-    runs.sort(key=lambda r: float(np.mean(changes[r])))
+    runs.sort(key=lambda r: float(np.mean(gains[r])))
     r = runs[3 * len(runs) // 4]
-    run, most = plant.runs[r], int(np.argmax(changes[r]))
+    run, most = plant.runs[r], int(np.argmax(gains[r]))
     rows: dict[str, dict[str, NDArray]] = {}
     for c, channel in enumerate(plant.channels):
         if not every_channel and c != most:

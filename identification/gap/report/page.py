@@ -88,8 +88,8 @@ def _verdict(diagnosis: Diagnosis, words: Words, next_experiment: str) -> Sectio
         *([Verdict(status="next", text=next_experiment)] if next_experiment else []),
     ]
     caption = (
-        "Readings and model before and after, on a recording that was never fitted to: one of those in "
-        "which the two models differ most."
+        "Readings and model before and after, on a recording that was never fitted to: one of those "
+        "that the correction improves most."
     )
     picture = Picture(figure=comparison_figure(diagnosis), caption=caption)
     return Section(title="Verdict", summary=True, verdicts=verdicts, blocks=[picture])
