@@ -261,11 +261,20 @@ def test_another_file_than_a_diagnosis_is_refused_before_anything_is_written(tmp
         [1],
         duration=1.0,
     )
-    (tmp_path / "gap.json").write_text('{"format": "epv-gap/3"}', encoding="utf-8")
     words = [str(tmp_path / "LOGS"), "--gap", str(tmp_path / "gap.json"), "--out", str(tmp_path / "out")]
-    assert main_of("training.commands.monitor", program="epv monitor", arguments=words) == 2
-    assert "'verdict' is missing: diagnose the log" in capsys.readouterr().err
-    assert not list((tmp_path / "out").glob("*"))
+    onset = dict.fromkeys(("drive", "earliest", "latest"), "drive-9.csv")
+    of_another_log = {
+        "format": "epv-gap/3", "verdict": "known", "ambiguity_set": [], "absorbed": [], "onset": None,
+        "causes": [{"effects": ["a"], "onset": {"a": onset}}], "levels": {"form": {}},
+    }  # fmt: skip
+    for content, told in [
+        ({"format": "epv-gap/3"}, "'verdict' is missing: diagnose the log"),
+        (of_another_log, "names drive-9.csv, which the log does not have: diagnose this log"),
+    ]:
+        (tmp_path / "gap.json").write_text(json.dumps(content), encoding="utf-8")
+        assert main_of("training.commands.monitor", program="epv monitor", arguments=words) == 2
+        assert told in capsys.readouterr().err
+        assert not list((tmp_path / "out").glob("*"))
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:

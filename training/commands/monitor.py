@@ -84,7 +84,7 @@ def run(options: Options) -> None:
     plant = load_plant(options.plant)
     log = read_log(options.log, rules_of(plant))
     log.check_period(Monitor.period, "the monitor counts periods of")
-    finding = options.gap and read_json(options.gap, _Finding, version=FORMAT, remedy="diagnose the log")
+    finding = options.gap and _diagnosis_of(log, options.gap)
     if options.plant and not options.model:
         model = monitor_model(plant, seed=options.seed)
     else:
@@ -97,6 +97,16 @@ def run(options: Options) -> None:
     if finding:
         print(agreement(monitor, log, ends, finding))
     print(f"written: {options.out / FIGURE}")
+
+
+def _diagnosis_of(log: Log, path: Path) -> _Finding:
+    """A diagnosis of the log. Raises ValueError for another file, and for that of another log."""
+    content = read_json(path, _Finding, version=FORMAT, remedy="diagnose the log")
+    began = [onset for cause in content["causes"] for onset in cause["onset"].values()]
+    drives = {str(file) for onset in began for file in onset.values()}
+    if unknown := sorted(drives - {drive.file for drive in log.drives}):
+        raise ValueError(f"{path} names {unknown[0]}, which the log does not have: diagnose this log")
+    return content
 
 
 def next_step(options: Options) -> NextStep:
