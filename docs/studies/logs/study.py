@@ -41,7 +41,7 @@ FOLDER = Path(__file__).parent
 SEED = 4931
 VALVES, WITHOUT = 100, 5
 """Valves; every fifth has no effect."""
-DRIVES, QUICK, DURATION = 10, 2, 30.0
+DRIVES, QUICK, DURATION = 10, 4, 30.0
 """Drives of a valve, the same under --quick, and length of a drive [s]: five minutes in all."""
 SPREAD, SIZES, DEVIATIONS = (0.94, 1.06), (1.0, 2.0), (0.2, 0.5)
 """Ranges of the calibrated parameters, as shares of the report's; of an effect's size, in sizes from
