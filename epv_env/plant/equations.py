@@ -332,15 +332,15 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
 
     These forces include the friction of a mover at rest on a stop; a mover that is let go has none yet.
 
-    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: True, or None,
-    for which numba drops the effects before it types them. Returns (State of rates, piston force,
-    armature force).
+    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: None, for
+    which numba drops the effects before it types them; FEW_LAWS where no other laws are in use; or
+    True. Returns (State of rates, piston force, armature force).
     """
     feed_MV = q
     if extended is not None:
         feed_MV = _with_supply(q, q.p1 - effects.supply_MV * q.supply_drop)
         q = _with_supply(q, q.p1 - effects.supply_PV * q.supply_drop)
-        effects = with_laws(q, effects)
+        effects = with_laws(q, effects, extended)
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
     force_MV = armature_force(feed_MV, c, inverse_Rm, effects, extended)

@@ -246,7 +246,7 @@ def _stepper(lanes):
             xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
             current = end.I
             if extended is not None:
-                acting = with_laws(end, effects)
+                acting = with_laws(end, effects, extended)
                 current = coil_current(u.U, end.I, c.R, end.coil_heat, acting)
             landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
             reached = chosen_state(refused, q, landed)

@@ -12,7 +12,7 @@ from epv_env.plant.effects.coil import COOLING_TIME, COPPER
 from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.law import KNOTS, placed
 from epv_env.plant.effects.movers import STRIBECK_SPEED, stribeck
-from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, has_effects
+from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, kernel_of
 from epv_env.plant.equations import (
     Coefficients,
     Inputs,
@@ -68,10 +68,10 @@ def test_an_effect_fades_with_its_size(name):
 
 
 def test_sizes_of_zero_are_no_effects():
-    assert not np.any(has_effects(effect_constants(CALIBRATED)))
+    assert not np.any(kernel_of(effect_constants(CALIBRATED)))
     for name in CATALOGUE:
         if name not in OUTSIDE:
-            assert np.all(has_effects(effect_constants(sized(name, 0.1)))), name
+            assert np.all(kernel_of(effect_constants(sized(name, 0.1)))), name
 
 
 def assert_scipy_agrees(p: Parameters) -> None:
@@ -95,9 +95,10 @@ def test_the_kernel_agrees_with_scipy_on_every_effect(name):
     assert_scipy_agrees(sized(name, 0.3))
 
 
-def test_the_kernel_agrees_with_scipy_on_a_law():
+@pytest.mark.parametrize("slot", [1, 4], ids=["usual kernel", "kernel with many laws"])
+def test_the_kernel_agrees_with_scipy_on_a_law(slot):
     """An eddy current that fades with p3 acts on the coil's rate and on the current that is read."""
-    law = placed(1, PLACES["eddy_current"], "p3", 1e5, 12e5, tuple(np.linspace(1.0, -0.5, KNOTS)))
+    law = placed(slot, PLACES["eddy_current"], "p3", 1e5, 12e5, tuple(np.linspace(1.0, -0.5, KNOTS)))
     assert_scipy_agrees(sized("eddy_current", 0.3).replace(**law))
 
 

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current
 from epv_env.plant.effects.measurement import command_delays
-from epv_env.plant.effects.registry import effect_constants, has_effects, with_laws
+from epv_env.plant.effects.registry import effect_constants, kernel_of, with_laws
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from epv_env.plant.parameters import Parameters
@@ -112,7 +112,7 @@ def _terminal_currents(digest: str) -> TerminalCurrents:
         c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
         for k in range(out.size):
             q = state_at(states, 0, k)
-            out[k] = coil_current(U, q.I, c.R, q.coil_heat, with_laws(q, e))
+            out[k] = coil_current(U, q.I, c.R, q.coil_heat, with_laws(q, e, True))
         return out
 
     return terminal_currents
@@ -176,7 +176,7 @@ class HybridAutomaton:
         c = coefficients(schedule.parameters, schedule.reservoir_volume)
         e = effect_constants(schedule.parameters)
         self.coefficients, self.effects = c, e
-        self.right_hand_side = right_hand_side or COMPILED_RIGHT_HAND_SIDES[bool(np.any(has_effects(e)))]
+        self.right_hand_side = right_hand_side or COMPILED_RIGHT_HAND_SIDES[bool(np.any(kernel_of(e)))]
         self.inputs = np.zeros(len(Inputs._fields))
         named = Coefficients(*c[:, 0])
         self.stroke = (named.xPVmax, named.xMVmax)

@@ -150,7 +150,7 @@ def _sources() -> dict[str, str]:
         derivative, (state, inputs, coefficients, effects, NUMBER, NUMBER, TRUTH)
     )
     for function, types in (
-        (with_laws, (state, effects)),
+        (with_laws, (state, effects, TRUTH)),
         (coil_current, (*[NUMBER] * 4, effects)),
         (longest_step, (NUMBER, state, effects, NUMBER, NUMBER)),
         (is_held, (NUMBER,) * 4),

@@ -161,7 +161,7 @@ static double step(State *q, const conditions *on, double remaining, double *hin
     land(&end->xMV, &end->vMV, c->xMVmax, c->eMV);
     end->I_coil = end->I;
     if (on->extended) {
-        const Effects acting = with_laws(end, &on->effects);
+        const Effects acting = with_laws(end, &on->effects, on->extended);
         end->I_coil = coil_current(on->u.U, end->I, c->R, end->coil_heat, &acting);
     }
     *q = *end;
