@@ -151,6 +151,29 @@ def test_a_saturating_magnet_with_remanence_conserves_energy():
     assert linkage_rate == pytest.approx(U - p["R"] * current, rel=1e-6)
 
 
+@pytest.mark.parametrize("w_sat", [0.0, 0.6, 1.0, 1.5])
+def test_the_inductance_bends_at_a_knee_and_the_emf_belongs_to_the_force(w_sat):
+    """dI/dt = (U - R I - v dF/dI)/L: the EMF of motion is the force's derivative by the current."""
+    p = CALIBRATED.replace(sMV=9e3, w_sat=w_sat)
+    c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_constants(p)[:, 0])
+
+    def magnet(current, v=0.0, U=24.0):
+        q = dict.fromkeys(State._fields, 0.0) | {"p1": 1e5, "p2": 1e5, "p3": 1e5}
+        q |= {"xMV": 3e-4, "vMV": v, "I": current}
+        return np.array(_magnet(State(**q), Inputs(U, 0.0, 0.0, 0.0), c, e))
+
+    current, d = 0.4, 1e-5
+    at_rest, moving, steps = magnet(current), magnet(current, v=0.3), magnet(current, U=25.0)
+    inductance = 1.0 / (steps - at_rest)[0]
+    reluctance = p["RML"] + (p["xMVmax"] - 3e-4) / (p["mu0"] * np.pi / 4 * p["dMB"] ** 2)
+    u = p["sMV"] * p["N"] * current / reluctance
+    steepness = (1 - w_sat) * (1 + u) ** 2 + w_sat * (1 + 16 * u**4)
+    assert inductance == pytest.approx(p["N"] ** 2 / reluctance / steepness, rel=1e-9)
+    emf = (at_rest - moving)[0] * inductance / 0.3
+    slope = (magnet(current + d) - magnet(current - d))[1] / (2 * d)
+    assert emf == pytest.approx(slope, rel=1e-6)
+
+
 def released_inductance(p: Parameters) -> float:
     """Inductance of the coil with the armature at its spring [H]."""
     return p["N"] ** 2 / (p["RML"] + p["xMVmax"] / (p["mu0"] * np.pi / 4 * p["dMB"] ** 2))
