@@ -225,7 +225,7 @@ class ClosedLoop:
         first = files.index(found.onset.drive) if found.onset else 0
         end = files.index(found.onset.mended) if found.onset and found.onset.mended else None
         result = self.compared(corrected, slice(first, end))
-        name = f"with {found.kept.title}" if found.kept.labels else "recalibrated"
+        name = f"with {found.model.title}" if found.model.labels else "recalibrated"
         caption = (
             f"Mean over {', '.join(files[first:end])}, after {SETTLING:g} s. Simulated: {REPEATS} runs "
             f"of {self.controller.name} in closed loop. Consumption is read off p2 while the valve is "

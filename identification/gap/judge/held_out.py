@@ -65,6 +65,11 @@ class DiscrepancyReduction:
     """By channel: noise deviation of the gaps relative to `Channel.noise` [1]."""
 
     @property
+    def closed_by_first(self) -> Interval:
+        """Share that the best cause closes [1]; nothing where there is none."""
+        return next(iter(self.shares_closed.values()), Interval(value=0.0, low=0.0, high=0.0))
+
+    @property
     def left(self) -> Gap:
         """Gap of the best cause, of the recalibrated model where there is none."""
         return self.gaps[next(iter(self.shares_closed), RECALIBRATED)]
@@ -134,6 +139,17 @@ def predictable_shares(problem: FittingProblem, estimate: Estimate) -> list[floa
     box = predict_residuals(plant, model, 0, time_scale(plant))
     before, after = _held_out_squares(plant, model.residuals, box)
     return list(1.0 - after / np.maximum(before, np.finfo(float).tiny))
+
+
+def is_predictable(problem: FittingProblem, estimate: Estimate, seed: int = 0) -> bool:
+    """Whether a black box foresees, beyond chance, what a model leaves of held-out runs."""
+    plant, model = problem.plant, predict(problem, estimate)
+    scale = time_scale(plant)
+    box = predict_residuals(plant, model, seed, scale)
+    before, after = _held_out_squares(plant, model.residuals, box)
+    return bool(
+        after.sum() < before.sum() and p_value(plant, model.residuals, box, seed, scale) < SIGNIFICANCE
+    )
 
 
 def _held_out_squares(

@@ -208,5 +208,5 @@ def test_a_nominal_model_is_not_called_recalibrated():
     better = replace(gaps[NOMINAL], overall=Interval(value=0.5, low=0.5, high=0.5))
     reduction = replace(found.reduction, gaps={**gaps, NOMINAL: better})
     found = replace(found, reduction=reduction)
-    assert found.kept is found.nominal
+    assert found.model is found.nominal
     assert "model to use: nominal, without a cause" in calibrated_values(found, "good").caption
