@@ -74,7 +74,7 @@ def named_cause(diagnosis: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def is_tied(label: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> bool:
-    """Whether a first cause that is named is as probable as a wrong one after it: its place is chance."""
+    """Whether a named first cause is as probable as a wrong one after it: its place is chance."""
     causes = diagnosis.get("causes", [])
     if not named_cause(diagnosis) or len(causes) < 2:
         return False

@@ -99,13 +99,20 @@ class HypothesisPool:
         return [each for each in ranked if id(each) in chosen]
 
     def bases(self, number: int) -> list[EvaluatedHypothesis]:
-        """What sets of one cause more grow from: the two best sets, and the best one without laws.
+        """What sets of one cause more grow from: the two best sets, and the best one without its laws.
 
         A law may stand for a further cause.
         """
         best = _best_of_sets(self.ranked(number))[:2]
-        plain = [self._found.get((frozenset(each.labels), frozenset())) for each in best[:1]]
-        return list({id(each): each for each in (*best, *plain) if each}.values())
+        if not best[0].estimate.hypothesis.laws:
+            return best
+        values, causes = self.problem.values(best[0].estimate), best[0].estimate.hypothesis.causes
+        start = self.problem.start(Hypothesis(causes=causes), values)
+        plain = self.cache(
+            f"without laws: {_names(best[:1])}",
+            lambda: fit(self.problem, [start], iterations=FIRST_ITERATIONS),
+        )
+        return [*best, *evaluate(self.problem, plain)]
 
     def finish(self, number: int) -> None:
         """Fit the best hypotheses of a number of causes further, and open more laws while it pays."""
@@ -160,11 +167,12 @@ def _key(hypothesis: Hypothesis) -> Key:
 
 def _names(chosen: Sequence[EvaluatedHypothesis]) -> str:
     """Hypotheses with their open laws in one line, for the journal."""
-    return "; ".join(
-        ", ".join([each.label, *(f"law of {law.cause.label} over {law.argument}" for law in laws)])
-        for each in chosen
-        for laws in [each.estimate.hypothesis.laws]
-    )
+    return "; ".join(_name(each.estimate.hypothesis) for each in chosen)
+
+
+def _name(hypothesis: Hypothesis) -> str:
+    laws = (f"law of {law.cause.label} over {law.argument}" for law in hypothesis.laws)
+    return ", ".join([" + ".join(hypothesis.labels), *laws])
 
 
 def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]) -> None:
@@ -179,7 +187,7 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
     _from_elsewhere(pool)
     pool.finish(1)
     for number in range(2, MOST_CAUSES + 1):
-        if not pool.much_is_left() or (number > 2 and not _last_cause_paid(pool, number - 1)):
+        if not pool.much_is_left() or (number > 2 and not _last_cause_helped(pool, number - 1)):
             break
         for smaller in pool.bases(number - 1):
             _fit_beside(pool, smaller.estimate)
@@ -189,10 +197,12 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
     _leave_causes_out(pool)
 
 
-def _last_cause_paid(pool: HypothesisPool, number: int) -> bool:
-    """Whether the best set of a number of causes is more probable than that of one less."""
-    sizes = [len(each.labels) for each in pool.posterior().hypotheses]
-    return number in sizes and sizes.index(number) < sizes.index(number - 1)
+def _last_cause_helped(pool: HypothesisPool, number: int) -> bool:
+    """Whether the best fit with a number of causes leaves less by a fifth than that with one less."""
+    found = pool.posterior()
+    pairs = zip(found.misfits, found.hypotheses, strict=True)
+    left = {len(each.labels): m for m, each in sorted(pairs, key=lambda pair: -pair[0])}
+    return left.get(number, np.inf) <= 0.8 * left[number - 1]
 
 
 def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature] = ()) -> None:
@@ -233,8 +243,8 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
         starts = [s for s in (*assumed, *best_start_of_each(opened)) if s.labels in best]
         return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
 
-    beside = f"beside {' and '.join(hypothesis.labels) or 'nothing'}"
-    pool.add(pool.cache(beside, fits, lambda estimate: problem.slopes_of(base)))
+    name = f"beside {_name(hypothesis) or 'nothing'}"
+    pool.add(pool.cache(name, fits, lambda estimate: problem.slopes_of(base)))
 
 
 def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) -> list[int]:
