@@ -34,7 +34,6 @@ ENDED = {
     "import a.csv --out campaign --plant valve.json": "run",
     "log --out log": "monitor",
     "monitor log --out monitor": "gap",
-    "rare --controller PWM --plant valve.json": "compare",
     "run campaign --out results": "gap",
     "run campaign --out results --stage quality --seed 3": "run",
     "sim-to-real --out loop": "compare",
