@@ -8,44 +8,22 @@ becomes the reference, from which the next one, or the return, is told. Memory i
 
 from collections import deque
 from dataclasses import dataclass
-from os import PathLike
-from pathlib import Path
-from typing import Any
 
-import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.actions import OnOff
-from epv_env.common.files import JSONFileError, read_json, write_json
+from identification.monitor.features import OpeningReader
+from identification.monitor.model import LINEAR, RETURN, UNKNOWN, MonitorModel, polynomial
 
-FORMAT = "epv-monitor/2"
-REMEDY = "make the monitor anew with `epv monitor`"
-SHIPPED = Path(__file__).with_name("monitor.json")
-"""The model of a monitor for the report's valve; `python -m training.monitoring` makes it."""
-
-BEFORE, AFTER = 8, 5
-"""Control periods with the coil on that an opening needs before and after."""
-SHORTEST, LONGEST = 9, 40
-"""Control periods with the coil off that it may have."""
-REST, FLAT = 0.3, 0.04
-"""Distance of p3 from p1, and range of p3 over five periods, below which the chamber rests [bar]."""
-RISE = 0.06
-"""Rise of p2 over its trend that tells that the valve is open [bar]: six times the noise."""
-SHUT = 5
-"""Control periods after the command in which the valve cannot be open yet."""
 CLIPPED = 4.0
 """Standard deviations beyond which a departure counts no more: consumption may change in an opening."""
 MEMORY = 400
 """Openings over which the valve's own offset is averaged: slow wear is followed."""
 BEFORE_START = 1.0
 """Operation before the monitor starts in which a change may have happened [h]."""
-UNKNOWN = "unknown"
-"""Name of a change that no effect of the catalogue explains."""
 UNKNOWN_SHARE, UNKNOWN_SHIFT = 0.2, 4.0
-"""Its prior probability [-], and its size in each whitened feature [standard deviations]."""
-RETURN = "return"
-"""Name of a change that takes back the latest one: a repair, a supply that is restored."""
+"""Prior probability of an unknown change [-], and its size in each whitened feature [deviations]."""
 RETURN_SHARE = 0.2
 """Prior probability of a return, once something has changed [-]."""
 CONFIRMED = 2
@@ -57,180 +35,10 @@ RELEARNT = 0.5 * np.pi / SETTLING
 reference, which an opening with a jump of consumption does not move."""
 CHANGES = 100
 """Settled changes that are remembered."""
-SMALLEST, LARGEST = 1e-9, 1e9
-"""Least scale and variance, and greatest magnitude, of a model's numbers: no simulation gives others."""
 LEAST = 1e-300
 """Shortest time [h]: its logarithm must stay a number."""
 STRENGTHS = (0.5, 1.0)
 """Sizes of every effect that are tested, as shares of the model's."""
-
-FEATURES = (
-    "I_off_1", "I_off_2", "I_on_1", "I_on_2", "I_on_3", "p3_rest", "p3_off_1", "p3_off_2",
-    "p3_vents_early", "p3_vents_late", "p3_opens", "time_opens", "p2_rise", "p2_rise_1", "p2_rise_2",
-    "p2_rise_whole", "p3_fills_1", "p3_fills_2", "p3_fills_late",
-)  # fmt: skip
-"""What `features` returns, in this order."""
-CONDITIONS = ("p1", "p2", "open", "U", "I_on", "slope")
-"""Conditions of an opening: pressures [bar], periods open, voltage [V], current of the held coil per
-voltage [A/V], which tells how warm the winding is, slope of p2 [bar/period]."""
-QUADRATIC = 5
-"""Conditions from the first on, whose products count, too."""
-OPEN, KINKS = CONDITIONS.index("open"), (-0.5, 0.5, 1.5, 2.5)
-"""Times open at which the dependence on it changes: readings are few in a short opening [periods]."""
-TERMS = 1 + len(CONDITIONS) + QUADRATIC * (QUADRATIC + 1) // 2 + len(KINKS)
-LINEAR = 1 + QUADRATIC
-"""Terms on which the nominal plant's features depend, and the first of them: those of a shift."""
-
-
-@dataclass(frozen=True)
-class MonitorModel:
-    """What the monitor knows of the nominal plant and the catalogue, in whitened features."""
-
-    centre: NDArray
-    """Typical conditions (conditions,)."""
-    scale: NDArray
-    """Their spread (conditions,)."""
-    whiten: NDArray
-    """From features to whitened ones (features, features)."""
-    expected: NDArray
-    """Whitened features of the nominal plant by terms of the conditions (features, terms)."""
-    offset: NDArray
-    """Variance of a valve's own offset, in variances of one opening (features,)."""
-    effects: tuple[str, ...]
-    """Effect of each shift."""
-    components: tuple[str, ...]
-    """Component of each shift."""
-    shifts: NDArray
-    """Shift of the whitened features (shifts, features, LINEAR)."""
-
-    def save(self, path: str | PathLike[str]) -> None:
-        """Write a JSON file."""
-        fields = {n: v.tolist() if isinstance(v, np.ndarray) else v for n, v in vars(self).items()}
-        write_json(path, {"format": FORMAT, **fields})
-
-    @classmethod
-    def load(cls, path: str | PathLike[str]) -> "MonitorModel":
-        """Read it. Raises JSONFileError."""
-        found = read_json(path, _File, version=FORMAT, remedy=REMEDY)
-        lists = msgspec.structs.asdict(found).items()
-        try:
-            values: dict[str, Any] = {name: np.array(value) for name, value in lists}
-            values |= {"effects": tuple(found.effects), "components": tuple(found.components)}
-            return cls(**values)
-        except ValueError as error:
-            raise JSONFileError(f"{path}: {error}: {REMEDY}") from None
-
-    def __post_init__(self) -> None:
-        """Raises ValueError for arrays that do not fit together, impossible numbers, and names."""
-        n, effects = len(FEATURES), len(self.effects)
-        shapes = {
-            "centre": (len(CONDITIONS),), "scale": (len(CONDITIONS),), "whiten": (n, n),
-            "expected": (n, TERMS), "offset": (n,), "shifts": (effects, n, LINEAR),
-        }  # fmt: skip
-        for name, shape in shapes.items():
-            if getattr(self, name).shape != shape:
-                raise ValueError(f"{name} has the shape {getattr(self, name).shape}, not {shape}")
-            low, values = SMALLEST if name in ("scale", "offset") else -LARGEST, getattr(self, name)
-            if wrong := values[~((values >= low) & (values <= LARGEST))].tolist():
-                raise ValueError(f"{name} holds {wrong[0]:g}, not a number from {low:g} to {LARGEST:g}")
-        if len(self.components) != effects:
-            raise ValueError(f"{len(self.components)} components for {effects} effects")
-        for name in (*self.effects, *self.components):
-            if not (name.isascii() and name.isidentifier()) or name in (UNKNOWN, RETURN):
-                raise ValueError(f"{name[:40]!r} is no name: give one of letters, digits and _")
-
-
-class _File(msgspec.Struct):
-    centre: list[float]
-    scale: list[float]
-    whiten: list[list[float]]
-    expected: list[list[float]]
-    offset: list[float]
-    effects: list[str]
-    components: list[str]
-    shifts: list[list[list[float]]]
-
-
-def polynomial(conditions: NDArray, centre: NDArray, scale: NDArray) -> NDArray:
-    """1, scaled conditions, products of the first QUADRATIC, and what `open` exceeds the KINKS by.
-
-    conditions: (openings, conditions) or (conditions,). Returns (openings, TERMS) or (TERMS,) [-].
-    """
-    x = (conditions - centre) / scale
-    rows, columns = np.triu_indices(QUADRATIC)
-    kinks = np.maximum(conditions[..., OPEN, None] - np.array(KINKS), 0.0)
-    return np.concatenate([np.ones_like(x[..., :1]), x, x[..., rows] * x[..., columns], kinks], axis=-1)
-
-
-@np.errstate(all="ignore")
-def features(rows: NDArray) -> tuple[NDArray, NDArray] | None:
-    """Conditions and features of one opening; None without all readings, rest before, or an opening.
-
-    rows: (BEFORE + periods off + AFTER, 6) with coil, U [V], p1, p2, p3 [bar] and I [A].
-    """
-    if not (np.all(np.isfinite(rows)) and rows[BEFORE - 1, 1] > 0.0):
-        return None
-    U, p1, p2, p3, I = rows[:, 1:].T  # noqa: E741
-    i, j = BEFORE, len(rows) - AFTER
-    voltage, supply = U[i - 1], p1[:i].sum() / i
-    rest = p3[i - 4 : i + 1].sum() / 5
-    if abs(rest - supply) > REST or np.ptp(p3[i - 4 : i + 1]) > FLAT or p3[i + 1 : j].min() <= 0.0:
-        return None
-    n = i + SHUT
-    t = np.arange(len(rows)) - (n - 1) / 2
-    slope = t[:n] @ p2[:n] / (n * (n * n - 1) / 12)
-    trend = p2[:n].sum() / n + slope * t
-    rise = p2 - trend
-    above = rise > RISE
-    at = n + int(np.argmax(above[n : j + 3] & above[n + 1 : j + 4]))
-    if not (above[at] and above[at + 1]) or above[at - 1]:
-        return None
-    part = (RISE - rise[at - 1]) / (rise[at] - rise[at - 1])
-    opens = at - 1 + part
-    current = I / voltage
-    log = np.log(p3[[i + 1, i + 2, i + 5, i + 9]])
-    z = np.array(
-        [
-            *current[i + 1 : i + 3], *current[j + 1 : j + 4],
-            rest - supply, log[0] - np.log(rest), log[1] - np.log(rest), log[2] - log[1],
-            log[3] - log[2], p3[at - 1] + part * (p3[at] - p3[at - 1]), opens - i,
-            *rise[j : j + 3], rise[j + 3 : j + 5].sum() / 2, p3[j + 1] - p3[j], p3[j + 2] - p3[j + 1],
-            p3[j + 4] - p3[j + 2],
-        ]
-    )  # fmt: skip
-    held = current[i - 2 : i + 1].sum() / 3
-    return np.array([supply, trend[i], j - opens, voltage, held, slope]), z
-
-
-class OpeningReader:
-    """Finds the openings in what the control unit reads: `update` once a control period."""
-
-    def __init__(self) -> None:
-        """Nothing has been read."""
-        self._rows: deque[tuple[float, ...]] = deque(maxlen=BEFORE + LONGEST + AFTER)
-        self.pause()
-
-    def pause(self) -> None:
-        """Periods are missing: openings do not reach across."""
-        self._rows.clear()
-        self._on, self._off = 0, -1  # -1: what came before the command is not known
-
-    def update(self, row: tuple[float, ...]) -> tuple[NDArray, NDArray] | None:
-        """Conditions (conditions,) and features (features,) of an opening that this period completes.
-
-        row: coil, U [V], p1, p2, p3 [bar] and I [A].
-        """
-        self._rows.append(row)
-        if row[0] < 0.5:
-            if self._on:
-                self._off = 0 if self._on >= BEFORE else -1
-            self._on = 0
-            self._off += self._off >= 0
-            return None
-        self._on += 1
-        if self._on == AFTER and SHORTEST <= self._off <= LONGEST:
-            return features(np.array(self._rows)[-(BEFORE + self._off + AFTER) :])
-        return None
 
 
 @dataclass(frozen=True)
@@ -335,13 +143,6 @@ class Monitor:
     def changes(self) -> list[Change]:
         """The settled changes, and that of an alarm that has not settled yet, in order of time."""
         return [*self.settled, *([self._change()] if self.alarm else [])]
-
-    def hypotheses(self) -> tuple[NDArray, NDArray, NDArray, list[str]]:
-        """Of each: shift (hypotheses, features, LINEAR), prior, 1 if it comes later, and effect.
-
-        The return, which has no shift of its own, is the last one of the priors and effects.
-        """
-        return self._shifts, self._weights, self._later[:-1], self._names
 
     def causes(self) -> dict[str, float]:
         """Probability of each effect, if something has changed, the likeliest first."""
