@@ -25,7 +25,6 @@ VERDICTS = {
 ENDED = {
     "bench --out 'my bench'": "run",
     "bench --out next --programme next.json --plant valve.json": "run",
-    f"closed-loop log --controller policy --out {KNOWN}": "train",
     "compare --controllers PWM PPO=policy": "sweep",
     "compare --quick": "sweep",
     "export policy --out c": "export",
