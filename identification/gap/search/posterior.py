@@ -78,7 +78,7 @@ def posterior(
     much_is_left = bool(np.min(misfits) > tolerated)
     tolerated += 0.0 if predictable else float(np.min(misfits))
     scores = log_likelihoods(misfits, tolerated) + log_priors(problem, hypotheses)
-    scores = np.append(scores, log_score_of_unknown(problem, scores, misfits, hypotheses, tolerated))
+    scores = np.append(scores, log_score_of_unknown(scores, misfits, hypotheses, tolerated))
     weights = softmax(scores)
     order = np.argsort(-scores[1:-1], kind="stable")
     return Posterior(
@@ -131,27 +131,31 @@ def _log_prior(problem: FittingProblem, each: EvaluatedHypothesis) -> float:
 
 
 def log_score_of_unknown(
-    problem: FittingProblem,
-    scores: NDArray,
-    misfits: NDArray,
-    hypotheses: Sequence[EvaluatedHypothesis],
-    tolerated: float,
+    scores: NDArray, misfits: NDArray, hypotheses: Sequence[EvaluatedHypothesis], tolerated: float
 ) -> float:
-    """That of an unknown cause: as complex as the best catalogued one, with usual laws and sizes.
+    """That of an unknown cause: as complex as the best set of causes, with usual laws and sizes.
 
-    It leaves as much as the nearest wrong cause usually does.
+    It leaves as much as the nearest wrong set of causes usually does: less with each open law. The set's
+    most credible variant counts, whatever laws improve it further.
 
     scores, misfits: of no cause, then of the hypotheses, (1 + n,).
     """
     if not hypotheses:
         return -np.inf
     best = int(np.argmax(scores[1:]))
-    hypothesis = hypotheses[best]
-    laws = len(hypothesis.estimate.hypothesis.laws)
-    wild = max(hypothesis.law_penalty - EXPECTED_PENALTY * laws, 0.0) + hypothesis.unusual
-    prior = _log_prior(problem, hypothesis) + wild + np.log(UNKNOWN)
-    left = UNKNOWN_SHARE * LAW_SHARE**laws * misfits[0]
-    return float(prior + log_likelihoods(left, tolerated))
+
+    def log_odds(each: EvaluatedHypothesis, misfit: float) -> float:
+        laws = len(each.estimate.hypothesis.laws)
+        wild = max(each.law_penalty - EXPECTED_PENALTY * laws, 0.0) + each.unusual
+        left = np.array([UNKNOWN_SHARE * LAW_SHARE**laws * misfits[0], misfit])
+        of_unknown, own = log_likelihoods(left, tolerated)
+        return float(np.log(UNKNOWN) + wild + of_unknown - own)
+
+    return float(scores[1 + best]) + min(
+        log_odds(each, misfit)
+        for each, misfit in zip(hypotheses, misfits[1:], strict=True)
+        if set(each.labels) == set(hypotheses[best].labels)
+    )
 
 
 def misfit_beyond_noise(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]) -> float:

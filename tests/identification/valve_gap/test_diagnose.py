@@ -37,7 +37,7 @@ def diagnosed(tmp_path_factory) -> Path:
 
 def test_the_command_names_the_effect_and_writes_its_files(diagnosed):
     found = json.loads((diagnosed / "out" / "gap.json").read_text())
-    assert found["format"] == "epv-gap/3"
+    assert found["format"] == "epv-gap/4"
     assert found["verdict"] == "known"
     assert found["ambiguity_set"] == [["eddy_current"]]
     value, low, high = found["causes"][0]["magnitude"]["G_eddy_S"]
