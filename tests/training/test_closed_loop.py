@@ -84,9 +84,9 @@ def test_nothing_is_claimed_without_an_effect():
 
 def test_only_drives_in_which_the_cause_acts_count():
     loop = ClosedLoop(logged(), PLANT, policy())
-    kept = SimpleNamespace(labels=("lag",), title="lag of p2")
+    model = SimpleNamespace(labels=("lag",), title="lag of p2")
     found: Any = SimpleNamespace(
-        onset=Onset("drive-1.csv", 0.99, None, "drive-1.csv", "drive-1.csv"), kept=kept
+        onset=Onset("drive-1.csv", 0.99, None, "drive-1.csv", "drive-1.csv"), model=model
     )
     (section,) = loop.sections(found, with_effect(tau_p2=0.02))
     table: Any = section.blocks[0]
