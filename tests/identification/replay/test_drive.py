@@ -71,9 +71,9 @@ def test_the_air_balance_alone_would_miss_it(monkeypatch, life):
 
 
 def test_a_ripple_on_the_reading_at_all_times_does_not_enter_the_model():
-    ripple = np.random.default_rng(0).standard_normal(len(truth("test1").time))
-    ripple = 2.0 * NOISE * lfilter([np.sqrt(1.0 - 0.95**2)], [1.0, -0.95], ripple)
     recording = exact_recording("test1", share=1.0)
+    white = np.random.default_rng(0).standard_normal(len(recording))
+    ripple = 2.0 * NOISE * np.asarray(lfilter([np.sqrt(1.0 - 0.95**2)], [1.0, -0.95], white))
     supply = smooth_supply(replace(recording, p1=recording.p1 + ripple), TRUE)
     assert rms(supply - truth("test1").channels["p1"]) < 0.5 * rms(ripple)
 
