@@ -225,7 +225,8 @@ def diagnosis_text(folder: Path) -> str:
     """Verdict and alternatives of the diagnosis in a folder."""
     verdict = decoded(folder / GAP, remedy=f"remove {folder}, and the diagnosis runs again")["verdict"]
     diagnosis = load_plant(folder / CORRECTED).diagnosis
-    best, *others = diagnosis.alternatives if diagnosis else ()
+    assert diagnosis is not None  # which every diagnosis writes
+    best, *others = diagnosis.alternatives
     first = f"{verdict}: {best.name.replace('_', ' ')} {best.probability:.2f}"
     return first + (f", {len(others)} more" if others else "")
 

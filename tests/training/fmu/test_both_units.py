@@ -44,7 +44,7 @@ class Slave:
         folder.mkdir()
         (folder / "unit.fmu").write_bytes(content)
         where = fmpy.extract(str(folder / "unit.fmu"), str(folder / "unzipped"))
-        described = fmpy.read_model_description(where)
+        described: Any = fmpy.read_model_description(where)
         self.references = {each.name: each.valueReference for each in described.modelVariables}
         identifier = described.coSimulation.modelIdentifier
         self.slave = FMU2Slave(
