@@ -36,7 +36,9 @@ from training.studies.comparison import (
     rows,
 )
 
-QUICK: dict[str, Any] = {"episodes": 8, "duration": 0.8, "decisions": 20}
+QUICK: dict[str, Any] = {
+    "out": Path("runs/quick-comparison"), "episodes": 8, "duration": 0.8, "decisions": 20,
+}  # fmt: skip
 LISTED = 100
 """Episodes that leave the band are named by their seeds up to this many."""
 

@@ -30,7 +30,9 @@ from training.studies.comparison import plant_region
 
 REGIONS = {"confidence": "confidence", "ten-percent": "sensitive_ten_percent"}
 """Plants by what a user calls them."""
-QUICK: dict[str, Any] = {"particles": 16, "repetitions": 2, "duration": 1.0, "least": 0.05}
+QUICK: dict[str, Any] = {
+    "out": Path("runs/quick-rare"), "particles": 16, "repetitions": 2, "duration": 1.0, "least": 0.05,
+}  # fmt: skip
 KEPT = 4
 """Rare episodes of a repetition that are described."""
 

@@ -52,7 +52,10 @@ SIMULATED, MEASURED = "simulated", "measured"
 CORRECTED = "plant.json"
 """Plant file that a diagnosis writes."""
 
-QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0, "suite": "report"}
+QUICK: dict[str, Any] = {
+    "out": Path("runs/quick-sim-to-real"), "timesteps": 8192, "episodes": 8, "duration": 1.0,
+    "suite": "report",
+}  # fmt: skip
 
 BEFORE, AFTER = "before", "after"
 """Stages: trained on the nominal plant, retrained on the corrected one."""
