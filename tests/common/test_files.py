@@ -214,7 +214,7 @@ def test_another_subject_is_refused_with_what_differs_and_nothing_is_wiped(path,
 
 
 def test_only_the_first_of_many_differences_are_named(path):
-    plant = {symbol: 1.0 for symbol in "abcde"}
+    plant = dict.fromkeys("abcde", 1.0)
     Journal(path.with_name("plant"), {"plant": plant})
     message = r"with plant\.a 1\.0, not null, plant\.b .*, plant\.c .* and 2 more: go on"
     with pytest.raises(ValueError, match=message):
