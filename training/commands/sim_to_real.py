@@ -55,7 +55,10 @@ CORRECTED = "plant.json"
 Mounted = Callable[[Controller], Controller]
 """Puts a policy on the bench's valve."""
 
-QUICK: dict[str, Any] = {"timesteps": 8192, "episodes": 8, "duration": 1.0, "suite": "report"}
+QUICK: dict[str, Any] = {
+    "out": Path("runs/quick-sim-to-real"), "timesteps": 8192, "episodes": 8, "duration": 1.0,
+    "suite": "report",
+}  # fmt: skip
 
 BEFORE, AFTER = "before", "after"
 """Stages: trained on the nominal plant, retrained on the plants that the diagnosis holds possible."""
