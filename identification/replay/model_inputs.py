@@ -138,7 +138,8 @@ def _is_ripple(residual: NDArray) -> bool:
     """Whether a residual is a small ripple that is there at all times."""
     squares = [float(np.mean(part**2)) for part in np.array_split(residual, 4)]
     white = 0.5 * float(np.mean(np.diff(residual) ** 2))
-    return np.mean(squares) <= SUPPLY_RIPPLE**2 * white and max(squares) <= STEADY * min(squares)
+    small = sum(squares) / len(squares) <= SUPPLY_RIPPLE**2 * white
+    return small and max(squares) <= STEADY * min(squares)
 
 
 def _spline(recording: Recording) -> NDArray:

@@ -31,7 +31,9 @@ def disturbed() -> Tank:
 def struck() -> Tank:
     """A cause that the catalogue lacks."""
     tank = leaking()
-    tank.causes = tuple(cause for cause in tank.causes if cause.name not in ("leak", "evaporation"))
+    tank.causes = tuple(  # type: ignore[assignment]
+        cause for cause in tank.causes if cause.name not in ("leak", "evaporation")
+    )
     return tank
 
 

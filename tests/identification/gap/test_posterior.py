@@ -84,7 +84,7 @@ def test_an_unknown_cause_is_as_complex_as_the_best_and_leaves_a_share():
 def test_sets_of_as_many_causes_share_a_prior_and_an_open_law_costs_its_choice():
     found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
     one, count = next(each for each in found.hypotheses if len(each.labels) == 1), len(RANGES)
-    causes = found.problem.plant.causes
+    causes = tuple(found.problem.plant.causes)
     sets = {
         number: replace(
             one, estimate=replace(one.estimate, hypothesis=Hypothesis(causes=causes[:number]))
