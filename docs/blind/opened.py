@@ -97,6 +97,14 @@ def reliability(cases: Sequence[Mapping[str, Any]]) -> list[list[str]]:
     return rows
 
 
+def labels_of(folder: Path) -> dict[str, Any]:
+    """Labels by case. Raises ValueError for a folder without them."""
+    path = folder / LABELS
+    if not path.exists():
+        raise ValueError(f"{folder} has no {LABELS}: give the folder of a round whose labels are opened")
+    return json.loads(path.read_text(encoding="utf-8"))
+
+
 def main(arguments: Sequence[str] | None = None) -> int:
     """Diagnose what is missing, and print the scores; returns the exit status."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
@@ -106,7 +114,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     labels = {
         (folder / name, options.out / folder.name / name): label
         for folder in options.rounds
-        for name, label in json.loads((folder / LABELS).read_text(encoding="utf-8")).items()
+        for name, label in labels_of(folder).items()
     }
     missing = [pair for pair in labels if not (pair[1] / GAP).exists()]
     if missing:

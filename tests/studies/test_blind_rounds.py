@@ -8,6 +8,7 @@ import pytest
 
 from docs.blind import collect
 from docs.blind.collect import ARCHIVE, FOLDER, main, packed, table, unpacked
+from docs.blind.opened import counts, judged, labels_of, reliability
 
 ANSWER = {
     "verdict": "known", "seconds": 41.2,
@@ -42,3 +43,45 @@ def test_a_round_is_added_or_replaced_and_the_others_stay(tmp_path, monkeypatch,
     assert row == "case-01,known,a + b; c,0.97; 0.02,12.3,2,1,41"
     with pytest.raises(ValueError, match="holds no answer"):
         main(["round-99", str(tmp_path / "answers/case-01/none")])
+
+
+def said(verdict, effects, probability):
+    causes = [{"effects": effects, "probability": probability}]
+    return {"verdict": verdict, "causes": causes}
+
+
+LEAK, BOTH = ["seat_leak"], ["seat_leak", "command_delay"]
+
+
+@pytest.mark.parametrize(
+    ("truth", "answer", "kind", "right", "named"),
+    [
+        (LEAK, said("known", LEAK, 0.95), "cause", True, True),
+        (BOTH, said("partial", LEAK, 0.8), "cause", True, True),
+        (LEAK, said("known", BOTH, 0.95), "cause", False, True),
+        (LEAK, said("unknown", LEAK, 0.1), "cause", True, False),
+        ([], said("no_gap", LEAK, 0.001), "none", False, False),
+        (["piston_seal_leak"], said("known", LEAK, 0.95), "stranger", False, True),
+        (LEAK, {"verdict": "failed"}, "cause", False, False),
+    ],
+)
+def test_a_first_cause_is_right_if_it_names_nothing_untrue(truth, answer, kind, right, named):
+    found = judged(truth, answer)
+    assert (found["kind"], found["right"], found["named"]) == (kind, right, named)
+
+
+def test_opened_cases_are_counted_by_kind_and_by_stated_probability():
+    cases = [judged(LEAK, said("known", LEAK, p)) for p in (0.9, 1.0, 0.5)]
+    cases += [judged(LEAK, said("partial", BOTH, 0.5)), judged([], said("unknown", LEAK, 0.1))]
+    counted = dict(counts(cases))
+    assert counted["right cause named"] == "3 of 4"
+    assert counted["wrong cause named"] == "1 of 4"
+    assert counted["alarm without an effect"] == "1 of 1"
+    assert [row[1:] for row in reliability(cases)] == [
+        ["-", "0 of 0"], ["-", "0 of 0"], ["0.50", "1 of 2"], ["-", "0 of 0"], ["0.95", "2 of 2"],
+    ]  # fmt: skip
+
+
+def test_a_round_without_labels_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"has no labels\.json: give the folder of a round"):
+        labels_of(tmp_path)

@@ -1,8 +1,8 @@
 """Search for the causes: a beam over sets of causes and their laws, grown by one cause or law at a time.
 
 A cause is fitted with the law that the catalogue assumes and with an open law, side by side; the state
-that the law follows promises most by linear prediction. What goes on is what is most probable
-(`posterior.py`): nothing else decides what survives.
+that the law follows promises most by linear prediction. What is fitted further is what is most probable
+(`posterior.py`).
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -22,7 +22,6 @@ from identification.gap.search.law_screening import law_starts, over_reached_sta
 from identification.gap.search.posterior import Posterior, posterior
 from identification.gap.search.screening import (
     CauseSignature,
-    Start,
     best_pairs,
     best_start_of_each,
     screen_causes,
@@ -36,7 +35,7 @@ MOST_CAUSES = 4
 
 WIDTH = 4
 """Width of the beam: sets of one size, and hypotheses of that size, that are fitted further; laws that
-are tried for each; pairs that are begun together. For computing time."""
+are tried for each. Twice as many first causes, and pairs, are begun. For computing time."""
 
 FIRST_ITERATIONS = 5
 """Most steps of the first fits, for computing time: those of finalists go on."""
@@ -111,6 +110,7 @@ class HypothesisPool:
         plain = self.cache(
             f"without laws: {_names(best[:1])}",
             lambda: fit(self.problem, [start], iterations=FIRST_ITERATIONS),
+            self.problem.slopes_of,
         )
         return [*best, *evaluate(self.problem, plain)]
 
@@ -278,8 +278,14 @@ def _from_elsewhere(pool: HypothesisPool) -> None:
             if any(own[symbol] != four[symbol] for symbol in four):
                 begun = problem.start(each.estimate.hypothesis, own | four)
                 starts.append(replace(begun, slopes=each.estimate.slopes))
-    name = f"from elsewhere: {_names(found)}"
-    pool.add(pool.cache(name, lambda: fit(problem, starts, iterations=FIRST_ITERATIONS)))
+    slopes = {e.labels: problem.slopes_of(e.estimate) for e in found}
+    pool.add(
+        pool.cache(
+            f"from elsewhere: {_names(found)}",
+            lambda: fit(problem, starts, iterations=FIRST_ITERATIONS),
+            lambda estimate: slopes.get(estimate.hypothesis.labels, problem.slopes),
+        )
+    )
 
 
 def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature]) -> None:
@@ -293,7 +299,7 @@ def _fit_pairs(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseS
             for first, second in best_pairs(base_runs, signatures, 2 * WIDTH)
         ]
         new = [pair for pair in pairs if pair.hypothesis not in pool]
-        starts: list[Start] = simulated_starts(problem, base, base_runs, new)
+        starts = simulated_starts(problem, base, base_runs, new)
         return fit(problem, [start.estimate for start in starts], iterations=FIRST_ITERATIONS)
 
     pool.add(pool.cache("pairs", fits, lambda estimate: problem.slopes_of(base)))
