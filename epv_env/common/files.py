@@ -218,7 +218,12 @@ def _sentence(text: str) -> tuple[str, str]:
 
 
 JOURNAL = "epv-journal/2"
-"""Form of a journal; one of another form starts anew."""
+"""Form of a journal."""
+
+SAME_SUBJECT = "go on with the same, choose another --out, or remove the file"
+
+SHOWN = 3
+"""Differences between two subjects that a message names."""
 
 
 def _checksum(name: str, result: str) -> int:
@@ -226,25 +231,60 @@ def _checksum(name: str, result: str) -> int:
     return zlib.crc32(f"[{name}, {result}]".encode())
 
 
+def _changes(earlier: Any, now: Any, name: str = "") -> list[str]:
+    """Where two decoded subjects differ, each as "plant.parameters.R 42.0, not 43.0"."""
+    if isinstance(earlier, dict) and isinstance(now, dict):
+        return [
+            change
+            for key in sorted({*earlier, *now})
+            for change in _changes(earlier.get(key), now.get(key), f"{name}.{key}")
+        ]
+    texts = [json.dumps(each) for each in (earlier, now)]
+    if texts[0] == texts[1]:
+        return []
+    return ["{} {:.40}, not {:.40}".format(name.removeprefix(".subject."), *texts)]
+
+
 class Journal:
     """Results by name in a JSON Lines file whose first line says what they belong to."""
 
-    def __init__(self, path: Path, subject: dict[str, Any]):
-        """subject: everything that the results depend on. A journal of another subject starts anew.
+    def __init__(self, path: Path, subject: dict[str, Any], remedy: str = SAME_SUBJECT):
+        """A new journal, or the one that is there.
 
-        Raises ValueError if a line is damaged, OSError if the file is no regular one.
+        Args:
+            path: of the file.
+            subject: everything that the results depend on.
+            remedy: what to do about a journal of another subject.
+
+        Raises ValueError if the file is no journal, belongs to another subject, or a line is damaged;
+        OSError if it is no regular file. What is finished is never wiped.
         """
         self.path = path
         self._found: dict[str, Any] = {}
-        header = json.dumps({"format": JOURNAL, "subject": subject}, sort_keys=True) + "\n"
+        header = json.dumps({"format": JOURNAL, "subject": subject}, sort_keys=True)
         content = read_bytes(path) if path.exists() else b""
         complete = content[: content.rfind(b"\n") + 1]  # the last line of a killed run may be torn
-        kept = complete if complete.startswith(header.encode()) else header.encode()
-        for number, line in enumerate(kept.split(b"\n")[1:-1], start=2):
+        if content:
+            self._check_subject(complete.partition(b"\n")[0], json.loads(header), remedy)
+        for number, line in enumerate(complete.split(b"\n")[1:-1], start=2):
             name, result = self._entry(line, number)
             self._found[name] = result
-        if kept != content:
-            write_bytes(path, kept)
+        if not content or complete != content:
+            write_bytes(path, complete or f"{header}\n".encode())
+
+    def _check_subject(self, line: bytes, header: dict[str, Any], remedy: str) -> None:
+        """Raise ValueError if a first line is another than the header of these results."""
+        try:
+            found = json.loads(line)
+        except (ValueError, RecursionError):
+            found = None
+        if not isinstance(found, dict) or found.get("format") != JOURNAL:
+            raise ValueError(f"{self.path} does not begin as {JOURNAL} does: move or remove the file")
+        if changes := _changes(found, header):
+            more = f" and {len(changes) - SHOWN} more" if len(changes) > SHOWN else ""
+            raise ValueError(
+                f"{self.path} holds results with {', '.join(changes[:SHOWN])}{more}: {remedy}"
+            )
 
     def _entry(self, line: bytes, number: int) -> tuple[str, Any]:
         """Name and result in a line of the file. Raises ValueError if it is damaged."""

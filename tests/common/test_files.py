@@ -195,9 +195,45 @@ def test_results_come_back(path):
     assert "three" not in journal
 
 
-def test_another_subject_starts_anew(path):
-    assert len(Journal(path, {**SUBJECT, "seed": 1})) == 0
+@pytest.mark.parametrize(
+    ("subject", "difference"),
+    [
+        ({**SUBJECT, "seed": 1}, "seed 0, not 1"),
+        ({"recordings": ["a"], "seed": 0}, r'recordings \["a", "b"\], not \["a"\]'),
+        ({**SUBJECT, "plant": {"R": 43.0}}, 'plant null, not {"R": 43.0}'),
+    ],
+)
+def test_another_subject_is_refused_with_what_differs_and_nothing_is_wiped(path, subject, difference):
+    before = path.read_bytes()
+    with pytest.raises(ValueError, match=rf"journal\.jsonl holds results with {difference}: go on with"):
+        Journal(path, subject)
+    with pytest.raises(ValueError, match=f"{difference}: restore the statement$"):
+        Journal(path, subject, remedy="restore the statement")
+    assert path.read_bytes() == before
+    assert len(Journal(path, SUBJECT)) == 2
+
+
+def test_only_the_first_of_many_differences_are_named(path):
+    plant = dict.fromkeys("abcde", 1.0)
+    Journal(path.with_name("plant"), {"plant": plant})
+    message = r"with plant\.a 1\.0, not null, plant\.b .*, plant\.c .* and 2 more: go on"
+    with pytest.raises(ValueError, match=message):
+        Journal(path.with_name("plant"), {"plant": {}})
+
+
+@pytest.mark.parametrize("content", ['{"format": "epv-journal/1"}\n', "a note\n", "[]\n", "no end"])
+def test_a_file_that_is_no_journal_is_refused_and_stays(path, content):
+    path.write_text(content)
+    with pytest.raises(ValueError, match="does not begin as epv-journal/2 does: move or remove"):
+        Journal(path, SUBJECT)
+    assert path.read_text() == content
+
+
+def test_an_empty_file_becomes_a_journal(path):
+    path.write_text("")
     assert len(Journal(path, SUBJECT)) == 0
+    Journal(path, SUBJECT).add("one", 1)
+    assert Journal(path, SUBJECT)["one"] == 1
 
 
 @pytest.mark.parametrize("torn", ['{"name": "three", "res', "{", '{"name": "three", "result": 1}'])

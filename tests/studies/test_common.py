@@ -8,6 +8,7 @@ import pytest
 from docs.studies.common import fill, study_options, study_parser, table
 from docs.studies.coverage.study import coverage, main
 from docs.studies.logs import study
+from docs.studies.rare import statement
 from identification.recordings.log_files import read_log
 
 PAGE = "# Speed\n\n<!-- generated: rows -->\nold\n<!-- end: rows -->\n\nWritten by hand.\n"
@@ -41,6 +42,21 @@ def test_a_trial_run_works_on_a_copy_of_the_page(tmp_path):
     assert (folder / "README.md").read_text() == PAGE
     assert "new" in (out / "README.md").read_text()
     assert options.work == out
+
+
+@pytest.mark.parametrize("edit", [{"episodes": 2000}, {"duration_s": 5.0}, {"scenario": "steps"}])
+def test_an_edited_statement_wipes_no_finished_batches(tmp_path, monkeypatch, edit):
+    files = {name: tmp_path / getattr(statement, name).name for name in ("STATEMENT", "RESULTS")}
+    files["RESULTS"].write_bytes(statement.RESULTS.read_bytes())
+    content = json.loads(statement.STATEMENT.read_text())
+    files["STATEMENT"].write_text(json.dumps(content | edit))
+    for name, path in files.items():
+        monkeypatch.setattr(statement, name, path)
+    ((name, value),) = edit.items()
+    difference = f"statement.{name} {json.dumps(content[name])}, not {json.dumps(value)}"
+    with pytest.raises(ValueError, match=f"statement.jsonl holds results with {difference}: restore"):
+        statement.main([])
+    assert files["RESULTS"].read_bytes() == statement.RESULTS.read_bytes()
 
 
 def test_shares_are_those_of_known_distances():

@@ -133,13 +133,12 @@ def test_a_stopped_comparison_goes_on_where_it_stopped(finished):
     assert columns == [line.rsplit(",", 1)[0] for line in table.splitlines()]  # the last are times
 
 
-def test_a_plant_of_another_voltage_has_figures_of_its_own(tmp_path):
-    """In the same folder, where the journal holds those of the first."""
+def test_a_plant_of_another_voltage_is_refused_in_the_folder_of_the_first(tmp_path, capsys):
     chosen = ("--controllers", "hysteresis", "--plants", "calibrated", "--episodes", 2, "--workers", 1)
-    for folder, voltage in (("one", 24.0), ("one", 18.0), ("other", 18.0)):
-        save_plant(replace(PLANT, voltage=voltage), tmp_path / "plant.json")
-        plant = ("--plant", tmp_path / "plant.json")
-        assert command(*chosen, *plant, "--out", tmp_path / folder) == 0
-    one, other = ((tmp_path / name / "finished.jsonl").read_bytes() for name in ("one", "other"))
-    assert one == other
-    assert b'"voltage_V": 18.0' in one
+    plant, out, before = tmp_path / "plant.json", tmp_path / "out", b""
+    for voltage, status in ((24.0, 0), (18.0, 2)):
+        save_plant(replace(PLANT, voltage=voltage), plant)
+        assert command(*chosen, "--plant", plant, "--out", out) == status
+        before = before or (out / "finished.jsonl").read_bytes()
+    assert (out / "finished.jsonl").read_bytes() == before
+    assert "holds results with plant.voltage_V 24.0, not 18.0: go on with" in capsys.readouterr().err

@@ -21,7 +21,7 @@ from controllers.policy_files import read_policy
 from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
-from training.commands.train import sentence_of
+from training.commands.train import Options, next_step, sentence_of, verdict
 from training.learners import ppo
 from training.learners.actor import network_of
 from training.learners.environment import REWARD_SCALE, make_training_env, training_weights
@@ -132,4 +132,40 @@ def test_the_verdict_says_what_the_interval_allows(low, high, words):
     paired = pd.DataFrame(
         {"controller": "PPO", "score": scores, "difference": 0.5, "low": low, "high": high}
     )
-    assert words in sentence_of(paired, 100)
+    sentence = sentence_of(paired, Options(episodes=100, parameters="ten_percent"))
+    assert f"{words} the 'adaptive pulse' controller on 100 unseen episodes" in sentence
+    assert "(plants: 4 parameters ±10 %)" in sentence
+
+
+@pytest.mark.parametrize(
+    ("parameters", "words"),
+    [("exact", "the plant itself"), ("confidence", "its confidence region"),
+     ("domain", "4 parameters in their domains")],
+)  # fmt: skip
+def test_the_verdict_is_given_on_the_plants_that_were_trained_on(
+    parameters, words, tmp_path, monkeypatch
+):
+    monkeypatch.setattr("training.commands.train.load_policy", lambda folder, plant: load_policy())
+    options = Options(out=tmp_path, parameters=parameters, episodes=2, duration=0.55, quick=True)
+    assert f"plants: {words};" in verdict(options, Plant.calibrated(), RewardWeights())
+
+
+@pytest.mark.parametrize(
+    ("given", "command"),
+    [({"parameters": "confidence"}, "--parameters confidence"),
+     ({"seed": 3, "scenario": "steps"}, "--seed 3 --scenario steps"),
+     ({"switching_price": 0.5}, "--switching-price 0.5")],
+)  # fmt: skip
+def test_the_training_after_a_short_one_has_the_same_options(given, command):
+    words = next_step(Options(quick=True, **given)).command()
+    assert words == f"epv train {command} --out runs/ppo-full"
+
+
+@pytest.mark.parametrize(
+    ("parameters", "more"),
+    [("confidence", ""), ("exact", ""),
+     ("diagnosis", " --plants calibrated confidence sensitive_ten_percent diagnosis")],
+)  # fmt: skip
+def test_the_comparison_after_a_training_has_its_plants(parameters, more):
+    words = next_step(Options(parameters=parameters, plant=Path("plant.json"))).command()
+    assert words.partition("runs/ppo-comparison")[2] == f"{more} --plant plant.json"

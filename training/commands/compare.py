@@ -27,6 +27,7 @@ from training.evaluation.rollout import decision_times
 from training.evaluation.scenarios import RANDOM, scenario_group
 from training.evaluation.seeds import EVALUATION_SEED, check_first_seed
 from training.studies.comparison import (
+    PLANT_SETS,
     PLANTS,
     Results,
     as_text,
@@ -36,7 +37,9 @@ from training.studies.comparison import (
     rows,
 )
 
-QUICK: dict[str, Any] = {"episodes": 8, "duration": 0.8, "decisions": 20}
+QUICK: dict[str, Any] = {
+    "out": Path("runs/quick-comparison"), "episodes": 8, "duration": 0.8, "decisions": 20,
+}  # fmt: skip
 LISTED = 100
 """Episodes that leave the band are named by their seeds up to this many."""
 
@@ -50,7 +53,7 @@ class Options(Episodes):
     against: Annotated[
         str | None, {"metavar": "LABEL"}, "whom the others are set against (the first)"
     ] = None
-    plants: Annotated[Sequence[str], {"nargs": "+", "choices": PLANTS}, "sets of plants"] = PLANTS
+    plants: Annotated[Sequence[str], {"nargs": "+", "choices": PLANT_SETS}, "sets of plants"] = PLANTS
     scenarios: Annotated[
         Names, "scenarios, or the groups named, beyond (beyond training), worn (one effect each)"
     ] = (RANDOM,)

@@ -35,7 +35,8 @@ DEFAULT = ("extrapolating hysteresis", "adaptive pulse", "PWM")
 """Controllers that are swept unless others are named: one of each kind."""
 
 QUICK: dict[str, Any] = {
-    "controllers": DEFAULT[:1], "episodes": 4, "joint_episodes": 16, "duration": 0.6,
+    "out": Path("runs/quick-sweep"), "controllers": DEFAULT[:1], "episodes": 4,
+    "joint_episodes": 16, "duration": 0.6,
     "factors": ["R", "V2", "piston_friction", "sensor noise", "control period", "latency"],
 }  # fmt: skip
 

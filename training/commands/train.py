@@ -36,9 +36,9 @@ from epv_env.plant.region import DIAGNOSIS, REGIONS
 from epv_env.reward import RewardWeights
 from epv_env.settings import as_region
 from training.evaluation.named import named_controllers
-from training.evaluation.plots import plt, save_figure
+from training.evaluation.plots import in_words, plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
-from training.studies.comparison import as_text, compare, differences, figure, rows
+from training.studies.comparison import PLANTS, as_text, compare, differences, figure, rows
 
 QUICK: dict[str, Any] = {
     "out": Path("runs/quick-ppo"), "timesteps": 65_536, "episodes": 16, "duration": 2.0,
@@ -47,7 +47,7 @@ QUICK_TRAINING: dict[str, Any] = {
     "num_envs": 64, "validation_episodes": 16, "validation_duration": 2.0,
 }  # fmt: skip
 REGION = "sensitive_ten_percent"
-"""Plants that are trained on, and on which the verdict is given."""
+"""Plants that are trained on, and on which the verdict is given, unless --parameters names others."""
 RIVALS = (
     "extrapolating hysteresis with rules", "adaptive pulse with rules", "adaptive pulse", "PWM",
     "extrapolating hysteresis",
@@ -113,13 +113,24 @@ def run(options: Options) -> None:
 
 
 def next_step(options: Options) -> NextStep:
-    """Compare the policy on more plants; after a short run, train."""
+    """Compare the policy on more plants; after a short run, train with the same options."""
     if options.quick:
-        words = ("train", "--out", beside(options.out, "full"))
+        words = ("train", *chosen(options), "--out", beside(options.out, "full"))
         return NextStep("to train a policy", words, options.plant)
     rivals, out = (RIVAL, f"PPO={options.out}"), beside(options.out, "comparison")
     words = ("compare", "--controllers", *rivals, "--out", out)
-    return NextStep("to compare the policy on three sets of plants", words, options.plant)
+    if options.parameters not in (*PLANTS, "exact"):
+        words = (*words, "--plants", *PLANTS, options.parameters)
+    return NextStep("to compare the policy on several sets of plants", words, options.plant)
+
+
+def chosen(options: Options) -> tuple[object, ...]:
+    """The options that make a training another than the usual one, as a command takes them."""
+    values = {name: getattr(options, name) for name in SAME_WHEN_RESUMED if name != "plant"}
+    changed = {name: value for name, value in values.items() if value != getattr(Options, name)}
+    return tuple(
+        word for name, value in changed.items() for word in (f"--{name.replace('_', '-')}", value)
+    )
 
 
 def begin_folder(options: Options, plant: Plant) -> None:
@@ -170,7 +181,7 @@ def verdict(options: Options, plant: Plant, weights: RewardWeights) -> str:
     policy = load_policy(options.out, plant)
     controllers = {policy.name: policy, **named_controllers(RIVALS, plant)[0]}
     results = compare(
-        controllers, plant=plant, plant_sets=[REGION],
+        controllers, plant=plant, plant_sets=[options.parameters],
         scenarios={"random": EvaluationScenario(options={"weights": weights})},
         episodes=options.episodes, duration=options.duration,
     )  # fmt: skip
@@ -180,12 +191,12 @@ def verdict(options: Options, plant: Plant, weights: RewardWeights) -> str:
     if options.quick:
         sentence = "This was a short run that shows that all works: nothing was learnt."
     else:
-        sentence = sentence_of(differences(results, RIVAL), options.episodes)
+        sentence = sentence_of(differences(results, RIVAL), options)
     picture = f"picture: {options.out / 'comparison.png'}"
     return f"\n{sentence}\n\n{as_text(table)}\n\n{picture}"
 
 
-def sentence_of(paired: pd.DataFrame, episodes: int) -> str:
+def sentence_of(paired: pd.DataFrame, options: Options) -> str:
     """Whether the policy is better than the RIVAL, and by what.
 
     paired: rows of `differences` against it.
@@ -200,7 +211,8 @@ def sentence_of(paired: pd.DataFrame, episodes: int) -> str:
     else:
         judged = "cannot be told from"
     return (
-        f"The policy {judged} the {RIVAL!r} controller on {episodes} unseen episodes within ±10 %: "
+        f"The policy {judged} the {RIVAL!r} controller on {options.episodes} unseen episodes "
+        f"(plants: {in_words(options.parameters)}): "
         f"return {gain['difference']:+.3g} ({gain['low']:+.3g} to {gain['high']:+.3g}), "
         f"{left['difference']:+.2g} % of the episodes leave the band, "
         f"{switchings['difference']:+.2g} switchings a second."

@@ -30,6 +30,8 @@ WORDS = {
     "confidence": "its confidence region",
     "ten_percent": "4 parameters ±10 %",
     "sensitive_ten_percent": "13 parameters ±10 %",
+    "domain": "4 parameters in their domains",
+    "diagnosis": "what the diagnosis holds possible",
 }
 """What people read instead of the names of plant sets."""
 

@@ -10,7 +10,8 @@ from matplotlib.figure import Figure
 from controllers.base import Controller
 from epv_env.common.files import Journal
 from epv_env.plant.plantfile import Plant
-from epv_env.plant.region import Region
+from epv_env.plant.region import DIAGNOSIS, REGIONS, Mixture, Region
+from epv_env.settings import as_region
 from training.evaluation.batches import Batch, run_batches
 from training.evaluation.metrics import EpisodeMetrics, summary, violation_interval
 from training.evaluation.plots import in_words, plt
@@ -20,6 +21,8 @@ from training.evaluation.statistics import paired_difference
 
 PLANTS = ("calibrated", "confidence", "sensitive_ten_percent")
 """The plant sets on which controllers are compared: the plant itself, and regions around it (C3)."""
+PLANT_SETS = tuple(dict.fromkeys((*PLANTS, *REGIONS, DIAGNOSIS)))
+"""All sets on which they can be compared; "exact" is "calibrated"."""
 
 Results = dict[tuple[str, str, str], EpisodeMetrics]
 """Episodes by plant set, scenario and controller."""
@@ -50,13 +53,13 @@ COLUMNS = {
 """Columns that are printed, and their headings."""
 
 
-def plant_region(plants: str, plant: Plant) -> Region:
-    """The region around a plant that one of PLANTS, or a region's name, stands for."""
+def plant_region(plants: str, plant: Plant) -> Region | Mixture:
+    """The plants that one of PLANT_SETS stands for. Raises OptionError if the plant lacks them."""
     if plants == "calibrated":
         return Region(centre=plant.parameters)
-    if plants == "confidence":
+    if plants == "confidence":  # of a plant without a region: the plant itself
         return plant.region
-    return Region.named(plants, plant.parameters)
+    return as_region(plants, plant)
 
 
 def compare(
@@ -81,7 +84,7 @@ def compare(
         scenarios: by name.
         episodes: number of episodes of each cell.
         duration: length of an episode, where the scenario has none of its own [s].
-        plant_sets: some of PLANTS, or names of regions.
+        plant_sets: some of PLANT_SETS.
         first_seed: of the episodes of each cell.
         workers: processes; None: one for each core.
         journal: finished batches; new ones are added.

@@ -122,7 +122,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--workers", type=COUNT, help="processes (default: all cores)")
     options = parser.parse_args(arguments)
     statement = announced()
-    journal = Journal(RESULTS, {"statement": vars(statement)})
+    remedy = f"restore {STATEMENT.name}, or move {RESULTS.name} away and announce the new statement"
+    journal = Journal(RESULTS, {"statement": vars(statement)}, remedy=remedy)
     count = -(-min(options.episodes or statement.episodes, statement.episodes) // BATCH)
     seeds = [
         (name, region, first)

@@ -84,16 +84,15 @@ def test_finished_searches_are_not_done_again(tmp_path, calls):
 
 
 @pytest.mark.parametrize("change", [{"subject": {"of": "b"}}, {"seed": 1}, {"starts": 4}])
-def test_searches_of_another_subject_are_not_used(tmp_path, calls, change):
+def test_searches_of_another_subject_are_neither_used_nor_wiped(tmp_path, calls, change):
     """Another number of starts moves all of them but the first."""
     usual = {"subject": {"of": "a"}, "starts": 3, "seed": 0}
     calibrate(problem(), journal=tmp_path / "journal", **usual)
     calls.clear()
-    calibrated = calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
-    assert len(calls) == 2 * {**usual, **change}["starts"]
-    ends = np.array([fit.start for fit in calibrated.fits["Nelder-Mead"]])
-    expected = starting_points(problem().vector, len(ends), {**usual, **change}["seed"])
-    np.testing.assert_array_equal(ends, expected)
+    with pytest.raises(ValueError, match=r"journal holds results with .*, not .*: go on with the same"):
+        calibrate(problem(), journal=tmp_path / "journal", **{**usual, **change})
+    calibrate(problem(), journal=tmp_path / "journal", **usual)
+    assert not calls
 
 
 @pytest.fixture

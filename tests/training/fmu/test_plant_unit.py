@@ -43,8 +43,8 @@ def drawn_parameters(rng: np.random.Generator, effects: Sequence[Effect]) -> Par
         changes[symbol] = Parameters.calibrated()[symbol] * rng.uniform(0.95, 1.05)
     for effect in effects:
         changes |= {size.symbol: size.drawn[1] for size in effect.drawn[0] if size.drawn}
-        forms = (size for size in effect.sizes if size.spread and size.domain)
-        changes |= {size.symbol: rng.uniform(*size.domain) for size in forms}
+        forms = {size.symbol: size.domain or (0.0, 0.0) for size in effect.sizes if size.spread}
+        changes |= {symbol: rng.uniform(low, high) for symbol, (low, high) in forms.items()}
     return Parameters.calibrated().replace(**changes)
 
 
