@@ -127,8 +127,6 @@ class Coefficients(NamedTuple):
     """Damping of the armature [N s/m]."""
     xMVmax: Value
     """Stroke of the armature [m]."""
-    eMV: Value
-    """Coefficient of restitution of the armature's stops [-]."""
     mMV_inverse: Value
     """1/mMV [1/kg]."""
     curtain_in: Value
