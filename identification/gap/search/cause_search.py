@@ -35,7 +35,7 @@ MOST_CAUSES = 4
 
 WIDTH = 4
 """Width of the beam: sets of one size, and hypotheses of that size, that are fitted further; laws that
-are tried for each. Twice as many first causes, and pairs, are begun. For computing time."""
+are tried of the best one. Twice as many first causes, and pairs, are begun. For computing time."""
 
 FIRST_ITERATIONS = 5
 """Most steps of the first fits, for computing time: those of finalists go on."""
@@ -131,15 +131,15 @@ class HypothesisPool:
             self.add(self._with_another_law(best))
 
     def _with_another_law(self, chosen: Sequence[EvaluatedHypothesis]) -> list[Estimate]:
-        """Fits of each of the best with one law more; of each, the laws that promise most."""
+        """Fits with one law more: the most probable one is tried with the most laws."""
 
         def fits() -> list[Estimate]:
             starts = []
-            for each in chosen:
+            for rank, each in enumerate(chosen, start=1):
                 base, causes = each.estimate, each.estimate.hypothesis.causes
                 runs = _most_misfitting(self.problem, dict(enumerate(each.residuals)))
                 found = law_starts(self.problem, base, [base] * len(causes), causes, runs)
-                starts += [start.estimate for start in found[:WIDTH]]
+                starts += [start.estimate for start in found[: max(WIDTH // rank, 1)]]
             distinct = {_key(start.hypothesis): start for start in reversed(starts)}
             return fit(self.problem, list(distinct.values()), iterations=FIRST_ITERATIONS)
 
@@ -187,7 +187,8 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
     _from_elsewhere(pool)
     pool.finish(1)
     for number in range(2, MOST_CAUSES + 1):
-        if not pool.much_is_left() or (number > 2 and not _last_cause_helped(pool, number - 1)):
+        # A set of three is sought where a pair is more probable than its causes alone, and so on.
+        if not pool.much_is_left() or len(pool.posterior().hypotheses[0].labels) < number - 1:
             break
         for smaller in pool.bases(number - 1):
             _fit_beside(pool, smaller.estimate)
@@ -195,14 +196,6 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
             _fit_pairs(pool, base, signatures)
         pool.finish(number)
     _leave_causes_out(pool)
-
-
-def _last_cause_helped(pool: HypothesisPool, number: int) -> bool:
-    """Whether the best fit with a number of causes leaves less by a fifth than that with one less."""
-    found = pool.posterior()
-    pairs = zip(found.misfits, found.hypotheses, strict=True)
-    left = {len(each.labels): m for m, each in sorted(pairs, key=lambda pair: -pair[0])}
-    return left.get(number, np.inf) <= 0.8 * left[number - 1]
 
 
 def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature] = ()) -> None:
