@@ -184,7 +184,10 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
         signatures: of all causes beside it.
     """
     _fit_beside(pool, base, signatures)
-    _from_elsewhere(pool)
+    if pool.much_is_left():
+        # Without the right cause a fit may end in a corner, far from the truth.
+        _fit_beside(pool, pool.problem.nominal_start(), name="at nominal parameters")
+        _with_parameters_of_the_best(pool)
     pool.finish(1)
     for number in range(2, MOST_CAUSES + 1):
         # A set of three is sought where a pair is more probable than its causes alone, and so on.
@@ -198,10 +201,16 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
     _leave_causes_out(pool)
 
 
-def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature] = ()) -> None:
+def _fit_beside(
+    pool: HypothesisPool,
+    base: Estimate,
+    signatures: Sequence[CauseSignature] = (),
+    name: str = "",
+) -> None:
     """Fit a set with each of the most promising further causes, as assumed and with an open law.
 
-    base: the set's estimate. signatures: of all causes beside it, where they are known.
+    base: the set's estimate. signatures: of all causes beside it, where they are known. name: in the
+    journal.
     """
     problem, hypothesis = pool.problem, base.hypothesis
     known = {cause.name for cause in hypothesis.causes}
@@ -209,7 +218,7 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
         cause
         for cause in problem.plant.causes
         if cause.name not in known
-        and replace(hypothesis, causes=(*hypothesis.causes, cause)) not in pool
+        and (not known or replace(hypothesis, causes=(*hypothesis.causes, cause)) not in pool)
     ]
     if not others:
         return
@@ -225,7 +234,8 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
         lawful = [] if hypothesis.causes else assumed
         estimates = [start.estimate for start in lawful]
         opened = law_starts(problem, base, estimates, [start.cause for start in lawful], runs)
-        promise = {start.labels: start.chi_square / base.chi_square for start in reversed(assumed)}
+        left = normal_equations(base_runs).chi_square
+        promise = {start.labels: start.chi_square / left for start in reversed(assumed)}
         whole = normal_equations(
             [run for run, r in zip(base_runs, problem.fitted_runs, strict=True) if r in runs]
         ).chi_square
@@ -234,9 +244,10 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
             promise[start.labels] = min(promise.get(start.labels, np.inf), share)
         best = set(sorted(promise, key=lambda labels: promise[labels])[: 2 * WIDTH])
         starts = [s for s in (*assumed, *best_start_of_each(opened)) if s.labels in best]
-        return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
+        rival = min(left, pool.recalibrated.estimate.chi_square)
+        return fit(problem, [s.estimate for s in starts], rival, iterations=FIRST_ITERATIONS)
 
-    name = f"beside {_name(hypothesis) or 'nothing'}"
+    name = name or f"beside {_name(hypothesis) or 'nothing'}"
     pool.add(pool.cache(name, fits, lambda estimate: problem.slopes_of(base)))
 
 
@@ -252,29 +263,21 @@ def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) 
     return [r for r, b in zip(order, before, strict=True) if b < 0.5 * sum(lengths.values())]
 
 
-def _from_elsewhere(pool: HypothesisPool) -> None:
-    """Fit no cause and the best single ones again: from the nominal model, from each other's parameters.
-
-    Without the right cause a fit may end in a corner, far from the truth.
-    """
+def _with_parameters_of_the_best(pool: HypothesisPool) -> None:
+    """Fit no cause and the single ones next to the best one again, from its calibrated parameters."""
     problem, found = pool.problem, _best_of_sets(pool.ranked(1))[:WIDTH]
     if not found:
         return
-    nominal = {p.symbol: p.nominal for p in problem.plant.parameters}
-    places = [nominal] + [problem.values(each.estimate) for each in found[:1]]
-    starts = []
-    for values in places:
-        four = {symbol: values[symbol] for symbol in nominal}
-        starts.append(problem.start(Hypothesis(causes=()), four))
-        for each in found:
-            own = problem.values(each.estimate)
-            if any(own[symbol] != four[symbol] for symbol in four):
-                begun = problem.start(each.estimate.hypothesis, own | four)
-                starts.append(replace(begun, slopes=each.estimate.slopes))
+    values = problem.values(found[0].estimate)
+    best = {p.symbol: values[p.symbol] for p in problem.plant.parameters}
+    starts = [problem.start(Hypothesis(causes=()), best)]
+    for each in found[1:]:
+        begun = problem.start(each.estimate.hypothesis, problem.values(each.estimate) | best)
+        starts.append(replace(begun, slopes=each.estimate.slopes))
     slopes = {e.labels: problem.slopes_of(e.estimate) for e in found}
     pool.add(
         pool.cache(
-            f"from elsewhere: {_names(found)}",
+            f"with parameters of the best: {_names(found)}",
             lambda: fit(problem, starts, iterations=FIRST_ITERATIONS),
             lambda estimate: slopes.get(estimate.hypothesis.labels, problem.slopes),
         )
