@@ -190,8 +190,7 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
         _with_parameters_of_the_best(pool)
     pool.finish(1)
     for number in range(2, MOST_CAUSES + 1):
-        # A set of three is sought where a pair is more probable than its causes alone, and so on.
-        if not pool.much_is_left() or len(pool.posterior().hypotheses[0].labels) < number - 1:
+        if not pool.much_is_left() or (number > 2 and not _last_cause_helped(pool, number - 1)):
             break
         for smaller in pool.bases(number - 1):
             _fit_beside(pool, smaller.estimate)
@@ -199,6 +198,17 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
             _fit_pairs(pool, base, signatures)
         pool.finish(number)
     _leave_causes_out(pool)
+
+
+def _last_cause_helped(pool: HypothesisPool, number: int) -> bool:
+    """Whether the best fit with a number of causes leaves less by a fifth than that with one less.
+
+    A second of four causes may hardly pay.
+    """
+    found = pool.posterior()
+    pairs = zip(found.misfits, found.hypotheses, strict=True)
+    left = {len(each.labels): m for m, each in sorted(pairs, key=lambda pair: -pair[0])}
+    return left.get(number, np.inf) <= 0.8 * left[number - 1]
 
 
 def _fit_beside(
