@@ -136,7 +136,7 @@ def test_laws_travel_in_a_plant_file_and_act_in_the_environment(tmp_path):
     ("laws", "message"),
     [
         ([GIVEN | {"unit": "bar"}], r"laws\[0\]: .*'p3' in 'bar' is unknown: choose one of p1"),
-        ([GIVEN | {"effect": "rust"}], "law of 'rust': choose one of armature_bounce, armature_friction"),
+        ([GIVEN | {"effect": "rust"}], "law of 'rust': choose one of armature_bounce"),
         ([GIVEN] * 5, "laws has 5 entries: give at most 4"),
         ([GIVEN | {"growth": [0.1] * 8}], r"laws\[0\]: .*give low < high and 9 numbers as growth"),
         ([GIVEN | {"growth": [9.0] * 9}], r"law1_1 = 9 1 is outside its domain \[-3, 3\].*give a value"),
