@@ -240,9 +240,9 @@ def often_opened(tmp_path_factory):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (scaled("p2_bar", 100.0), "p2_bar looks like kPa: give bar absolute"),
-        (scaled("p3_bar", 1.0, -1.0), "p3_bar looks like gauge pressure"),
-        (scaled("I_A", -1.0), "I_A looks like a current with its sign flipped"),
+        (scaled("p2_bar", 100.0), "beyond the sensor's 16 bar: check unit, .* of p2_bar"),
+        (scaled("p3_bar", 1.0, -1.0), "joins them: check unit, reference, .* of p1_bar, p3_bar"),
+        (scaled("I_A", -1.0), "A make -[0-9.]+ ohm, and coils have 8 to 220 ohm"),
         (scaled("I_A", 0.0, -1.0), "line 2?[0-9]+: .*and coils have 8 to 220 ohm"),
         (one_wild, r"drive-1.csv, line 2: U_supply_V is 1e\+300, outside the sensor's range"),
     ],
@@ -258,7 +258,7 @@ def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tm
     ("failed", "told"),
     [
         (scaled("I_A", 1.0, 0.1), "A flows while the coil is off"),
-        (scaled("I_A", 0.0), "make inf ohm, .*: check unit, sign and sensor"),
+        (scaled("I_A", 0.0), "make inf ohm, .*: check unit, reference, sign and"),
     ],
 )
 def test_a_sensor_that_fails_on_the_way_is_left_to_the_diagnosis(failed, told, often_opened, tmp_path):
