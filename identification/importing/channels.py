@@ -47,8 +47,8 @@ def clock_of(
         and other.file == channel.file
         and (_is_called(other, named) if named else holds_times(other))
     ]
-    table = channel.table
-    while called:
+    parts = channel.table.split(".")
+    for table in (".".join(parts[:depth]) for depth in range(len(parts), -1, -1)):
         clocks = [c for c in called if c.table == table and len(c.values) == len(channel.values)]
         if len(clocks) > 1:
             names = " or ".join(repr(source.label(clock)) for clock in clocks[:4])
@@ -58,9 +58,6 @@ def clock_of(
             )
         if clocks:
             return read_times(source, mapping, clocks[0])
-        if not table:
-            break
-        table = table.rpartition(".")[0]
     for clock in called:
         source.check(clock)
     raise ImportingError(
@@ -142,8 +139,10 @@ class MappedChannel:
 class UnclearChannels(ImportingError):
     """A file lacks channels of a recording, or their meaning or unit is unclear."""
 
-    missing: Sequence[str] = ()
-    """Channels of the recording that it lacks."""
+    def __init__(self, sentence: str, missing: Sequence[str]):
+        """missing: channels of the recording that it lacks."""
+        super().__init__(sentence)
+        self.missing = missing
 
 
 def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, SourceChannel]:
@@ -195,11 +194,8 @@ def _unclear(
     sources = {n: source.label(c) for n, c in chosen.items() if n in (*several, *silent)}
     units = {name: EXAMPLES[QUANTITY[name]] for name in (*silent, *missing)}
     example = mapping_example(sources | dict.fromkeys(missing, "NAME"), units)
-    error = UnclearChannels(
-        f"{source.path}: {'; '.join(said)}: say it in a mapping file such as {example}"
-    )
-    error.missing = missing
-    return error
+    sentence = f"{source.path}: {'; '.join(said)}: say it in a mapping file such as {example}"
+    return UnclearChannels(sentence, missing)
 
 
 def mapped_channels(

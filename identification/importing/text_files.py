@@ -85,11 +85,6 @@ class TextTable:
         whole = self.width <= len(cells) <= self.width + 1
         return whole and is_value(cells[self.measured[0]])
 
-    def is_row(self, line: int) -> bool:
-        """Whether all cells of such a line can be read."""
-        cells = self.cells(line)
-        return self.is_sample(line) and all(self.is_known(cells[column]) for column in self.measured)
-
     def sampled(self) -> list[int]:
         """Some lines from the middle and the end, by which the dialect is known."""
         middle, count = len(self.lines) // 2, len(self.lines)
@@ -192,7 +187,7 @@ def _header(table: TextTable) -> tuple[list[str], list[str], int]:
     count = len(table.lines)
     top = [table.cells(k) for k in range(min(SAMPLE, count))]
     named = next((k for k, row in enumerate(top) if sum(meaning(c) is not None for c in row) > 1), 0)
-    first = next((k for k in range(named, count) if table.is_row(k)), count)
+    first = next((k for k in range(named, count) if table.is_sample(k)), count)
     higher = [table.cells(k) for k in range(first)]
     ends_empty = table.width - 1 not in table.measured
     above = [row for cells in higher for row in _as_wide(cells, table.width, ends_empty)]
