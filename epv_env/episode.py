@@ -65,16 +65,6 @@ class Start:
         """Draw an episode; rng gives one seed, from which the three streams of the episode come."""
         seed = int(rng.integers(2**63))
         plant, disturbance, noise = (np.random.default_rng((seed, stream)) for stream in range(3))
-        return cls.from_streams(plant, disturbance, noise, settings, seed)
-
-    @classmethod
-    def from_streams(
-        cls, plant: Any, disturbance: Any, noise: Any, settings: Settings, seed: int = 0
-    ) -> "Start":
-        """An episode from its three streams: generators, or what stands for them.
-
-        seed: from which the conditions are drawn.
-        """
         region = settings.plants.chosen(plant)
         p1 = settings.supply.draw(disturbance)
         target = disturbance.uniform(*settings.first_target)

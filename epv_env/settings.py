@@ -125,7 +125,8 @@ def as_weights(value: Any, band_bar: Any) -> RewardWeights:
 def as_effects(value: Any) -> dict[str, Any]:
     """Sizes of effects by symbol, each a number or (low, high) [SI].
 
-    value: by the effect's name a size, or where it has several a mapping of sizes by symbol; None: none.
+    value: by the effect's name its strength, or a mapping of sizes by symbol, which an effect needs that
+    has several strengths; None: none.
     """
     if value is None:
         return {}
@@ -133,9 +134,9 @@ def as_effects(value: Any) -> dict[str, Any]:
         raise OptionError(f"effects is {shown(value)}: give a mapping from an effect's name to its size")
     sizes: dict[str, Any] = {}
     for name, size in value.items():
-        symbols = effect(name).symbols
-        by_symbol = size if isinstance(size, Mapping) else dict.fromkeys(symbols, size)
-        if (not isinstance(size, Mapping) and len(symbols) > 1) or set(by_symbol) - set(symbols):
+        symbols, strengths = effect(name).symbols, effect(name).strengths
+        by_symbol = size if isinstance(size, Mapping) else dict.fromkeys(strengths, size)
+        if (not isinstance(size, Mapping) and len(strengths) > 1) or set(by_symbol) - set(symbols):
             raise OptionError(
                 f"effect {name} is sized by {', '.join(symbols)}: give a mapping from these symbols to "
                 "values or (low, high)"

@@ -114,10 +114,6 @@ class LimitingTask:
             under_conditions(Start.draw(rng, chosen), chosen.conditions)
             for rng, chosen in zip(rngs, settings, strict=True)
         ]
-        return self.begin_from(np.asarray(where), starts)
-
-    def begin_from(self, where: NDArray, starts: Sequence[Start]) -> NDArray:
-        """`begin` with episodes that are drawn already, one for each index of `where`."""
         self._set_plants(where, starts)
         for i, start in zip(where.tolist(), starts, strict=True):
             self.parameters[i] = start.parameters

@@ -18,7 +18,6 @@ from hypothesis import strategies as st
 pytest.importorskip("torch")
 pytest.importorskip("statsmodels")
 
-from controllers.monitor import MonitorModel
 from controllers.policy import TRAINED
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, read_policy
 from epv_env.common.commands import commands, main
@@ -27,9 +26,10 @@ from epv_env.common.options import Number, parser_of
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from identification.bench.programmes import REPORT_SUITE, load_programmes, save_programmes
 from identification.importing.mapping_file import read_mapping
+from identification.monitor.model import MonitorModel
 from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.recordings.columns import REQUIRED_COLUMNS, read_columns
-from tests.controllers.test_monitor import white_model
+from tests.identification.monitor.test_monitor import white_model
 from tests.identification.recordings.good_campaign import campaign_of, switching
 
 pytestmark = pytest.mark.training

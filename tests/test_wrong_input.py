@@ -23,6 +23,7 @@ REFUSED = [
     ("bench --suite none", "argument --suite: invalid choice: 'none'"),
     ("run /no/campaign", "cannot read"),
     ("run campaign --stage none", "argument --stage: invalid choice: 'none'"),
+    ("gap campaign --controller PPO", "--controller is of `epv gap LOGS --logs`"),
     ("train --quick --scenario flood", "unknown consumption scenario 'flood'"),
     ("train --quick --plant nowhere.json", "cannot read plant file nowhere.json"),
     ("train --quick --parameters diagnosis", "has no alternatives to draw from"),

@@ -5,8 +5,9 @@ Consumption is not logged: p2 gives it while the valve is shut, and it is smooth
 drive that is treated as a log, and simulated again, shows how exact that is.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,15 +18,17 @@ from scipy.sparse.linalg import spsolve
 from controllers.base import Controller
 from epv_env.actions import OnOff
 from epv_env.common.units import BAR, GRAM
-from epv_env.plant.plantfile import Plant
+from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.plant.primitives import mass_flux
 from epv_env.plant.supply import Supply
 from epv_env.reward import BAND_BAR
 from epv_env.signals import MovingTarget, RecordedConsumption
 from identification.gap.diagnosis import Diagnosis
-from identification.recordings.log_files import Drive, Log
+from identification.recordings.log_files import Drive, Log, read_log
+from identification.recordings.recording import rules_of
 from identification.report.page import Section, Table, Verdict
 from training.drives import check_can_log, drives
+from training.evaluation.named import named_controllers
 
 SETTLING = 0.5
 """Time of a drive after which p2 counts [s]."""
@@ -225,7 +228,7 @@ class ClosedLoop:
         first = files.index(found.onset.drive) if found.onset else 0
         end = files.index(found.onset.mended) if found.onset and found.onset.mended else None
         result = self.compared(corrected, slice(first, end))
-        name = f"with {found.kept.title}" if found.kept.labels else "recalibrated"
+        name = f"with {found.model.title}" if found.model.labels else "recalibrated"
         caption = (
             f"Mean over {', '.join(files[first:end])}, after {SETTLING:g} s. Simulated: {REPEATS} runs "
             f"of {self.controller.name} in closed loop. Consumption is read off p2 while the valve is "
@@ -237,6 +240,15 @@ class ClosedLoop:
         verdict = Verdict(status=status, text=text)
         table = _table(result, name, caption)
         return [Section(title="What it costs the controller", verdicts=[verdict], blocks=[table])]
+
+
+def sections_about(
+    folder: Path, plant: Path | None, controller: str
+) -> Callable[[Diagnosis, Plant], list[Section]]:
+    """What makes the section about the controller of a log; plant: file. Raises ValueError."""
+    nominal = load_plant(plant)
+    (found,) = named_controllers([controller], nominal)[0].values()
+    return ClosedLoop(read_log(folder, rules_of(nominal)), nominal, found).sections
 
 
 def sentence(result: Compared, name: str) -> tuple[str, str]:

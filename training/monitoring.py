@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.monitor import LINEAR, SHIPPED, MonitorModel, OpeningReader, polynomial
 from controllers.tuned import tuned
 from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.supply import Supply
+from identification.monitor.features import OpeningReader
+from identification.monitor.model import LINEAR, SHIPPED, MonitorModel, polynomial
 from training.drives import drives
 
 CONTROLLERS = ("hysteresis", "extrapolating hysteresis", "adaptive pulse")

@@ -30,16 +30,24 @@ from epv_env.common.options import parse
 from epv_env.common.results_folder import only_writer
 
 
-def main(packages: Sequence[str], *, program: str, arguments: Sequence[str] | None = None) -> int:
+def main(
+    packages: Sequence[str],
+    *,
+    program: str,
+    arguments: Sequence[str] | None = None,
+    given: Mapping[str, str] = {},
+) -> int:
     """Run the command that the first argument names; returns the exit status.
 
     Args:
         packages: names of packages of commands.
         program: what the user types before the command's name.
         arguments: None for those of the process.
+        given: by command, a function that its `run` gets, too, as "MODULE:NAME": its package may not
+            import it.
     """
     words = list(sys.argv[1:] if arguments is None else arguments)
-    return fail_clearly(lambda: _run_named(commands(packages), program, words))
+    return fail_clearly(lambda: _run_named(commands(packages), program, words, given))
 
 
 def main_of(module: str, *, program: str, arguments: Sequence[str] | None = None) -> int:
@@ -65,7 +73,9 @@ def help_line(module: str) -> str:
     return (ast.get_docstring(ast.parse(text)) or "").partition("\n")[0]
 
 
-def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> int:
+def _run_named(
+    known: Mapping[str, str], program: str, arguments: list[str], given: Mapping[str, str]
+) -> int:
     if not arguments or arguments[0] in ("-h", "--help"):
         width = max(map(len, known))
         lines = [f"  {name:{width}}  {help_line(module)}" for name, module in known.items()]
@@ -80,10 +90,10 @@ def _run_named(known: Mapping[str, str], program: str, arguments: list[str]) -> 
         close = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {close[0]!r}?" if close else f"`{program}` lists them"
         raise ValueError(f"there is no command {name!r}: {hint}")
-    return _run(known[name], f"{program} {name}", rest)
+    return _run(known[name], f"{program} {name}", rest, *filter(None, [given.get(name)]))
 
 
-def _run(name: str, program: str, arguments: list[str]) -> int:
+def _run(name: str, program: str, arguments: list[str], *given: str) -> int:
     try:
         module = importlib.import_module(name)
         options = parse(module, program, arguments)
@@ -91,7 +101,9 @@ def _run(name: str, program: str, arguments: list[str]) -> int:
         alone = nullcontext() if out is None else only_writer(out)
         # The matrices are small: threads of the linear algebra would only wait for each other.
         with threadpool_limits(1, user_api="blas"), alone:
-            module.run(options)
+            module.run(
+                options, *(lambda *words, of=of: pkgutil.resolve_name(of)(*words) for of in given)
+            )
         if step := module.next_step(options):
             print(f"\n{step}")
     except ModuleNotFoundError as error:

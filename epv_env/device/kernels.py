@@ -46,7 +46,7 @@ NUMBERS = ("state", "coefficients", "effects", "with_effects", "delay", "acting_
 COEFFICIENTS = N_STATE
 EFFECTS = COEFFICIENTS + N_COEFFICIENT
 WITH_EFFECTS = EFFECTS + N_EFFECT
-DELAY, ACTING_U, DELAY_LEFT = range(WITH_EFFECTS + 1, WITH_EFFECTS + 4)
+DELAY_ON, DELAY_OFF, ACTING_U, DELAY_LEFT = range(WITH_EFFECTS + 1, WITH_EFFECTS + 5)
 P2, COIL_ENERGY = (State._fields.index(name) for name in ("p2", "coil_energy"))
 """Rows of the table, the state being the first ones."""
 ENTRIES = len(LAYOUT)
@@ -133,7 +133,7 @@ def delayed_parts(inputs, duration, numbers):
 
     inputs (4, N_INPUT, 1), duration (4, 1): rows 0 and 1 hold the parts, then all rows.
     """
-    if numbers[DELAY, 0] <= 0.0:
+    if numbers[DELAY_ON, 0] <= 0.0 and numbers[DELAY_OFF, 0] <= 0.0:
         return 2 if duration[1, 0] > 0.0 else 1
     for part in (1, 0):
         for row in range(N_INPUT):
@@ -142,8 +142,9 @@ def delayed_parts(inputs, duration, numbers):
     for first in (0, 2):
         whole, former = duration[first, 0], numbers[ACTING_U, 0]
         before, numbers[ACTING_U, 0], numbers[DELAY_LEFT, 0] = acting(
-            inputs[first, U_ROW, 0], whole, numbers[DELAY, 0], former, numbers[DELAY_LEFT, 0]
-        )
+            inputs[first, U_ROW, 0], whole, numbers[DELAY_ON, 0], numbers[DELAY_OFF, 0], former,
+            numbers[DELAY_LEFT, 0],
+        )  # fmt: skip
         if before > 0.0:
             inputs[first, U_ROW, 0] = former
         duration[first, 0], duration[first + 1, 0] = before, whole - before

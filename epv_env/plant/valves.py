@@ -16,6 +16,8 @@ from epv_env.common.units import BAR
 from epv_env.plant import integrate
 from epv_env.plant.channels import SENSOR_SYMBOLS
 from epv_env.plant.coefficients import coefficients
+from epv_env.plant.effects.coil import OFF_VOLTAGE
+from epv_env.plant.effects.measurement import command_delays
 from epv_env.plant.effects.registry import effect_constants, has_effects
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
@@ -62,38 +64,45 @@ U_ROW = Inputs._fields.index("U")
 """Row of the voltage in a table of inputs."""
 
 
-def delayed_inputs(table: NDArray, duration: NDArray, delay: NDArray) -> tuple[NDArray, NDArray]:
+PARTS = 3
+"""Of a period with a delayed voltage: delays to on and to off end within it, each at its own time."""
+
+
+def delayed_inputs(table: NDArray, duration: NDArray, delays: NDArray) -> tuple[NDArray, NDArray]:
     """Inputs whose voltage acts later, and the durations for which they hold.
 
-    Every period is split in two: the first part still has the former voltage. The first voltage is
-    taken to have acted before.
+    The coil follows the latest voltage whose delay has passed: one that a later voltage overtakes never
+    acts. Every period is split into PARTS. The first voltage is taken to have acted before.
 
     Args:
         table: inputs (periods, rows of Inputs, lanes) [SI].
         duration: (periods, lanes) [s]; the same in all periods of a lane, or 0.
-        delay: (lanes,) [s].
+        delays: of voltages that switch the coil on, and off, (2, lanes) [s].
 
     Returns:
-        Both with twice the periods; every second one ends where a period of the original ends.
+        Both with PARTS times the periods; every PARTS-th one ends where a period of the original ends.
     """
-    longest = np.max(duration, axis=0)
-    whole = np.floor(delay / np.where(longest > 0, longest, np.inf) + 1e-9).astype(int)
-    rest = np.maximum(delay - whole * longest, 0.0)
-    U = table[:, U_ROW]
-    at = np.arange(len(U))[:, None] - whole
-    parts = np.repeat(table, 2, axis=0)
-    parts[0::2, U_ROW] = np.take_along_axis(U, np.maximum(at - 1, 0), axis=0)
-    parts[1::2, U_ROW] = np.take_along_axis(U, np.maximum(at, 0), axis=0)
-    before = np.minimum(rest, duration)
-    durations = np.empty((2 * len(U), U.shape[1]))
-    durations[0::2], durations[1::2] = before, duration - before
+    U, longest = table[:, U_ROW], np.max(duration, axis=0)
+    whole = np.floor(delays / np.where(longest > 0, longest, np.inf) + 1e-9).astype(int)
+    rest = np.maximum(delays - whole * longest, 0.0)
+    number, on = np.arange(len(U))[:, None], U > OFF_VOLTAGE
+    latest = [np.maximum.accumulate(np.where(own, number, 0), axis=0) for own in (on, ~on)]
+    begins = np.zeros_like(duration)
+    parts, durations = np.repeat(table, PARTS, axis=0), np.empty((PARTS * len(U), U.shape[1]))
+    for part, end in enumerate((np.min(rest, axis=0), np.max(rest, axis=0), np.inf)):
+        passed = [np.maximum(number - own - (begins < r), 0) for own, r in zip(whole, rest, strict=True)]
+        arrived = [np.take_along_axis(*each, axis=0) for each in zip(latest, passed, strict=True)]
+        parts[part::PARTS, U_ROW] = np.take_along_axis(U, np.maximum(*arrived), axis=0)
+        ends = np.minimum(end, duration)
+        durations[part::PARTS], begins = ends - begins, ends
     return parts, durations
 
 
 @exact
-def acting(commanded, duration, delay, acted, left):
-    """What a coil with a delay sees of a voltage that is commanded for a duration [s].
+def acting(commanded, duration, delay_on, delay_off, acted, left):
+    """What a coil with delays sees of a voltage that is commanded for a duration [s].
 
+    delay_on, delay_off: of a voltage that switches the coil on or off [s].
     acted: the voltage that acted last [V], NaN before the first. left: for how long it still acts [s].
     Returns for how long it acts now [s], and both as they are afterwards.
     """
@@ -102,7 +111,8 @@ def acting(commanded, duration, delay, acted, left):
     former = commanded if math.isnan(acted) else acted
     if former == commanded:
         return 0.0, commanded, 0.0
-    left = delay if left <= 0.0 else left
+    if left <= 0.0:
+        left = delay_on if commanded > OFF_VOLTAGE else delay_off
     before = min(left, duration)
     left -= before
     return before, (former if left > 0.0 else commanded), left
@@ -112,7 +122,9 @@ def acting(commanded, duration, delay, acted, left):
 def _act(commanded, duration, delay, acted, left, before):
     """`acting` of all lanes; acted and left (lanes,) change, before (lanes,) [s] is the result."""
     for i in range(len(commanded)):
-        before[i], acted[i], left[i] = acting(commanded[i], duration[i], delay[i], acted[i], left[i])
+        before[i], acted[i], left[i] = acting(
+            commanded[i], duration[i], delay[0, i], delay[1, i], acted[i], left[i]
+        )
 
 
 SENSOR_RECORD = np.dtype((np.record, [(symbol, np.float64) for symbol in SENSOR_SYMBOLS]))
@@ -163,7 +175,7 @@ class Valves:
         self._duration = np.zeros(lanes)
         self._no_record = np.empty((0, N_STATE, lanes))
         self._with_effects = np.zeros(lanes, dtype=bool)
-        self._delay = np.zeros(lanes)
+        self._delay = np.zeros((2, lanes))
         self._acting_U = np.full(lanes, np.nan)
         self._delay_left = np.zeros(lanes)
         self.nominal = True
@@ -219,7 +231,7 @@ class Valves:
         constants = effect_constants(p)
         self.tables.effects[:, where] = constants
         self._with_effects[where] = has_effects(constants)
-        self._delay[where] = p["t_delay"]
+        self._delay[0, where], self._delay[1, where] = command_delays(p)
         self._acting_U[where] = np.nan
         for symbol in SENSOR_SYMBOLS:
             self.tables.sensors[symbol][where] = p[symbol]
@@ -228,8 +240,8 @@ class Valves:
     def advance(self, duration: ArrayLike) -> None:
         """Apply `inputs` for `duration` [s], one for all or one per valve (n,).
 
-        A coil with a delay keeps its former voltage for that long after a change of U; a change within
-        the delay starts it anew.
+        A coil with a delay keeps its former voltage for that long after a change of U; a change back
+        within the delay cancels it.
         """
         self._duration[: self.n] = duration
         if not np.any(self._delay):
@@ -261,7 +273,7 @@ class Valves:
             table, duration = delayed_inputs(table, duration, self._delay)
         out = np.empty((len(table), *self.tables.state.shape))
         self._run(table, duration, out)
-        return State(*out[delayed :: 1 + delayed, :, : self.n].transpose(1, 0, 2))
+        return State(*(out[PARTS - 1 :: PARTS] if delayed else out)[:, :, : self.n].transpose(1, 0, 2))
 
     def _run(self, inputs: NDArray, duration: NDArray, out: NDArray) -> None:
         """Run both kernels if valves with and without effects are mixed, each on its own valves.

@@ -84,13 +84,13 @@ def effect_sizes(setting: str) -> dict[str, float]:
         raise ValueError(f"--effect {setting}: unknown effect; known are {', '.join(CATALOGUE)}")
     if not given:
         return {size.symbol: size.typical for size in effect(name).drawn[0]}
-    if len(sizes) != len(symbols):
+    if not len(effect(name).strengths) <= len(sizes) <= len(symbols):
         raise ValueError(
             f"--effect {setting}: {name} is sized by {', '.join(symbols)}: give a number for each, "
             "parted by commas"
         )
     rule, example = f"--effect {setting}: give NAME=SIZE", "--effect piston_friction=8,0"
-    return {s: _number(size, rule, example) for s, size in zip(symbols, sizes, strict=True)}
+    return {s: _number(size, rule, example) for s, size in zip(symbols, sizes, strict=False)}
 
 
 def _number(text: str, rule: str, example: str) -> float:

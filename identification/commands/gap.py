@@ -3,10 +3,10 @@
 The guide is docs/how-to/diagnose-a-gap.md.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 from epv_env.common.command_line import NextStep
 from epv_env.common.files import decoded
@@ -30,14 +30,27 @@ class Options:
     without: Annotated[
         Sequence[str], {"action": "append", "metavar": "CAUSE"}, "leave out of the catalogue"
     ] = ()
+    controller: Annotated[
+        str | None, "that wrote the log, as `epv compare` takes them: report what the gap costs it"
+    ] = None
 
 
-def run(options: Options) -> None:
-    """Diagnose the campaign, and say what the verdict means. Raises ValueError."""
-    read = operation.diagnose_log if options.logs else diagnose.diagnose_campaign
-    found = read(
-        options.campaign, options.out, plant=options.plant, without=options.without, seed=options.seed
+def run(
+    options: Options, sections: Callable[[Path, Path | None, str], diagnose.More] | None = None
+) -> None:
+    """Diagnose the campaign, and say what the verdict means. Raises ValueError.
+
+    sections: about the controller of a log with a plant file.
+    """
+    read: Callable[..., Diagnosis] = (
+        operation.diagnose_log if options.logs else diagnose.diagnose_campaign
     )
+    about: dict[str, Any] = {name: getattr(options, name) for name in ("plant", "without", "seed")}
+    if options.controller is not None:
+        if not (options.logs and sections):
+            raise ValueError("--controller is of `epv gap LOGS --logs`: no other command knows it")
+        about["more"] = sections(options.campaign, options.plant, options.controller)
+    found = read(options.campaign, options.out, **about)
     say(found, options.out)
     written = (diagnose.REPORT, GAP_FILE, diagnose.PLANT)
     print(f"written: {', '.join(str(options.out / name) for name in written)}")

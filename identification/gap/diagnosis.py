@@ -1,7 +1,7 @@
 """The whole diagnosis of a grey-box plant: which cause, where, and how far the gap is reduced."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from identification.block_bootstrap import Interval
 from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, evaluate_linearised
@@ -17,15 +17,15 @@ from identification.gap.judge.held_out import (
     NOMINAL,
     RECALIBRATED,
     DiscrepancyReduction,
+    is_predictable,
     measure_discrepancy_reduction,
     predictable_shares,
 )
 from identification.gap.judge.verdict import (
-    AMBIGUITY_SHARE,
-    AMBIGUOUS,
     KNOWN,
-    PARTIAL,
-    UNKNOWN,
+    MOST,
+    NO_GAP,
+    SURE,
     Conclusion,
     RankedCause,
     Ranking,
@@ -38,8 +38,9 @@ from identification.gap.plant import GreyBox
 from identification.gap.plant_checks import check, check_description
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
-from identification.gap.search.cause_search import HypothesisPool, is_small, search_causes
+from identification.gap.search.cause_search import HypothesisPool, search_causes
 from identification.gap.search.onset import Onset
+from identification.gap.search.posterior import posterior
 from identification.gap.search.screening import assess_separability, simulate_signatures
 
 NOTICED_WORSENING = 0.05
@@ -87,13 +88,12 @@ class Diagnosis:
 
     @property
     def best(self) -> RankedCause | None:
-        """The cause that the verdict names, or the nearest one; None where none is needed."""
-        named = self.conclusion.verdict in (KNOWN, AMBIGUOUS, PARTIAL, UNKNOWN)
-        return self.judged[0] if named and self.judged else None
+        """The most probable cause, whether it is named or not; None where none is needed."""
+        return self.judged[0] if self.conclusion.verdict != NO_GAP and self.judged else None
 
     @property
     def named(self) -> RankedCause | None:
-        """The most probable cause of those that the verdict names; None where it names none."""
+        """The most probable cause where the verdict names it."""
         return next(iter(self.conclusion.ambiguity_set), None)
 
     def share_closed(self, cause: RankedCause) -> Interval:
@@ -104,35 +104,31 @@ class Diagnosis:
         return self.reduction.shares_closed[cause.hypothesis.label]
 
     @property
-    def advised(self) -> RankedCause | None:
-        """The cause to add: the named one where it surely helps, else one that surely halves the gap.
-
-        The latter is to be added whether its name is sure or not.
-        """
-        if self.named:
-            return self.named if self.surely_helps(self.named) else None
-        helping = [cause for cause in self.judged if self.share_closed(cause).low >= 0.5]
-        return max(helping, key=lambda cause: self.share_closed(cause).value, default=None)
+    def helps(self) -> bool:
+        """Whether the most probable cause is to be added: it surely reduces the held-out gap, and where
+        its name is doubtful it surely closes most of it."""
+        return bool(self.best) and self.share_closed(self.best).low > (0.0 if self.named else MOST)
 
     @property
-    def kept(self) -> EvaluatedHypothesis:
-        """The model to use: with the cause to add, else recalibrated or nominal.
+    def model(self) -> EvaluatedHypothesis:
+        """The model to use: with the most probable cause if it helps, else recalibrated or nominal.
 
-        The nominal one where the others are clearly worse on held-out recordings.
+        The nominal one where that is clearly worse on held-out recordings.
         """
-        best = self.advised.hypothesis if self.advised else self.ranking.recalibrated
-        label = best.label or RECALIBRATED
-        gaps = {name: self.reduction.gaps[name].overall.value for name in (label, NOMINAL)}
-        return best if gaps[label] <= (1.0 + NOTICED_WORSENING) * gaps[NOMINAL] else self.nominal
+        found = self.best.hypothesis if self.best and self.helps else self.ranking.recalibrated
+        gaps = {name: self.reduction.gaps[name].overall.value for name in (_label(found), NOMINAL)}
+        return (
+            found if gaps[_label(found)] <= (1.0 + NOTICED_WORSENING) * gaps[NOMINAL] else self.nominal
+        )
 
     @property
-    def kept_label(self) -> str:
+    def model_label(self) -> str:
         """The causes of the model to use in one line, as in files; else RECALIBRATED or NOMINAL."""
-        return NOMINAL if self.kept is self.nominal else self.kept.label or RECALIBRATED
+        return NOMINAL if self.model is self.nominal else _label(self.model)
 
-    def surely_helps(self, cause: RankedCause) -> bool:
-        """Whether adding a judged cause surely reduces the gap on held-out recordings."""
-        return self.share_closed(cause).low > 0.0
+
+def _label(hypothesis: EvaluatedHypothesis) -> str:
+    return hypothesis.label or RECALIBRATED
 
 
 def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) -> Diagnosis:
@@ -160,7 +156,7 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
     estimates |= {c.hypothesis.label: c.hypothesis.estimate for c in judged}
     reduction = measure_discrepancy_reduction(ranking.problem, estimates, seed=seed)
     conclusion = conclude(ranking, localisation, reduction)
-    left = conclusion.verdict in (PARTIAL, UNKNOWN)
+    left = conclusion.verdict not in (NO_GAP, KNOWN)
     return Diagnosis(
         ranking=ranking,
         conclusion=conclusion,
@@ -189,24 +185,26 @@ def rank_hypotheses(plant: GreyBox, cache: FitCache | None = None) -> Ranking:
     cache, plant = cache or FitCache(plant), prepared(plant)
     problem, base = recalibrated_by_seen_noise(plant, cache)
     ranking = _searched(problem, base, cache)
-    if not any(own.ripple for own in ranking.noise):
+    if any(own.ripple for own in ranking.noise):
+        foreseen = predictable_shares(problem, ranking.best.estimate)
+        weighted = with_ripple(prepared(problem.plant), ranking.noise, foreseen)
+        if weighted is not problem.plant:
+            cache = cache.named("with the ripple filtered: ")
+            ranking = _searched(*recalibrate(weighted, cache), cache)
+    base = ranking.recalibrated
+    if not ranking.much_is_left or is_predictable(ranking.problem, base.estimate):
         return ranking
-    foreseen = predictable_shares(problem, ranking.best.estimate)
-    weighted = with_ripple(prepared(problem.plant), ranking.noise, foreseen)
-    if weighted is problem.plant:
-        return ranking
-    cache, thorough = cache.named("with the ripple filtered: "), is_small(plant)
-    return _searched(*recalibrate(weighted, cache, thorough=thorough), cache)
+    found = posterior(ranking.problem, base, ranking.hypotheses, predictable=False)
+    return replace(ranking, **vars(found))
 
 
 def recalibrated_by_seen_noise(plant: GreyBox, cache: FitCache) -> tuple[FittingProblem, Estimate]:
     """The recalibrated model; readings are weighed by the noise that its residuals show."""
-    thorough = is_small(plant)
-    problem, base = recalibrate(plant, cache, thorough=thorough)
+    problem, base = recalibrate(plant, cache)
     corrected = with_seen_noise(problem, base)
     if corrected is problem.plant:
         return problem, base
-    return recalibrate(corrected, cache, thorough=thorough, prefix="with the noise seen: ")
+    return recalibrate(corrected, cache, prefix="with the noise seen: ")
 
 
 def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranking:
@@ -219,9 +217,8 @@ def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranki
     recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
     pool = HypothesisPool(problem, recalibrated, cache)
     search_causes(pool, base, signatures)
-    return Ranking(
-        problem=problem, recalibrated=recalibrated, separability=separability, **vars(pool.posterior())
-    )
+    found = vars(pool.posterior())
+    return Ranking(problem=problem, recalibrated=pool.recalibrated, separability=separability, **found)
 
 
 def _locate(ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int) -> Localisation:
@@ -232,7 +229,7 @@ def _locate(ranking: Ranking, hypothesis: EvaluatedHypothesis, seed: int) -> Loc
 def _judged_causes(ranking: Ranking) -> list[RankedCause]:
     """The fewest causes that hold most of the probability of all, and the next three single ones."""
     causes = causes_by_name(ranking)
-    first = max(len(smallest_set(causes, AMBIGUITY_SHARE)), 1)
+    first = max(len(smallest_set(causes, SURE)), 1)
     singles = [cause for cause in causes[first:] if len(cause.effects) == 1]
     return [*causes[:first], *singles[:3]]
 

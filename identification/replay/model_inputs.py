@@ -20,6 +20,11 @@ from identification.recordings.recording import HOLD, Recording
 BLOCK = 0.02
 """Length of the blocks over which what remains of a signal must average out [s]."""
 
+SUPPLY_RIPPLE, STEADY = 3.0, 4.0
+"""Largest ripple on the reading of p1 that is taken for the sensor's [standard deviations of its white
+noise], and largest ratio of its mean squares in the quarters of a recording [1], as it is there at all
+times. The model would pass it on to p2 as a true pressure."""
+
 
 @dataclass(frozen=True, kw_only=True)
 class ModelInputs:
@@ -82,14 +87,15 @@ def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
     """p1 without its noise [Pa], (samples,).
 
     Reservoirs lose the air that is drawn from them, by which p1 falls in proportion (R T / V1). Where
-    this leaves more than white noise and more than the rounding of coarse readings, because the supply
+    this leaves more than white noise, a ripple and the rounding of coarse readings, because the supply
     has a life of its own, a smoothing spline (generalised cross-validation) takes its place.
     """
     fitted = _air_balance(recording, p)
     residual = recording.p1 - fitted
     # Readings that waver between two codes scatter by up to 1.7 rounding errors, fine steps far more.
     rounding = 1.4 * rounding_error(quantisation_step([recording.p1], fewest=1))
-    if _is_white(residual, recording.period) or np.sqrt(np.mean(residual**2)) <= rounding:
+    coarse = np.sqrt(np.mean(residual**2)) <= rounding
+    if _is_white(residual, recording.period) or coarse or _is_ripple(residual):
         return fitted
     return _spline(recording)
 
@@ -126,6 +132,14 @@ def _is_white(residual: NDArray, period: float) -> bool:
     variance = 0.5 * np.mean(np.diff(residual) ** 2)
     statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
     return bool(statistic <= variance * chi2.isf(1e-4, len(blocks)))
+
+
+def _is_ripple(residual: NDArray) -> bool:
+    """Whether a residual is a small ripple that is there at all times."""
+    squares = [float(np.mean(part**2)) for part in np.array_split(residual, 4)]
+    white = 0.5 * float(np.mean(np.diff(residual) ** 2))
+    small = sum(squares) / len(squares) <= SUPPLY_RIPPLE**2 * white
+    return small and max(squares) <= STEADY * min(squares)
 
 
 def _spline(recording: Recording) -> NDArray:

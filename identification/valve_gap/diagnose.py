@@ -136,10 +136,10 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     gap on held-out recordings. Its region is where the recordings leave parameters, sizes and laws,
     jointly; autocorrelated residuals widen it. Its `diagnosis` holds every plant that is still possible.
     """
-    best = found.kept
+    best = found.model
     region = region_of(found, best, valve)
     methods = {RECALIBRATED: "recalibration", NOMINAL: "none: recalibration makes it worse"}
-    own = f" with {best.label}" if best.labels else f", {found.kept_label}"
+    own = f" with {best.label}" if best.labels else f", {found.model_label}"
     return replace(
         valve.plant,
         parameters=region.centre,
@@ -147,7 +147,7 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
         diagnosis=possible_plants(found, valve),
         name=name + own,
         provenance={
-            "method": methods.get(found.kept_label, "joint refit with the cause of the gap"),
+            "method": methods.get(found.model_label, "joint refit with the cause of the gap"),
             "software": f"epv-valve {version('epv-valve')}",
             "verdict": found.conclusion.verdict,
             "recordings_sha256": {r.name: r.sha256 for r in valve.recordings},

@@ -159,7 +159,7 @@ def _span_by_refits(valve: "LoggedValve", spans: Mapping[str, Span], found: Diag
     def refit(span: tuple[int, int]) -> None:
         plant = copy(prepared(problem.plant))
         plant.plant = valve.acting_in({**spans, cause.label: Span(*span, 1.0, False, span)})
-        narrowed = FittingProblem(plant, problem.slopes, thorough=problem.thorough)
+        narrowed = FittingProblem(plant, problem.slopes)
         squares[span] = fit(narrowed, [restarted(estimate)], iterations=3)[0].chi_square
 
     for start in range(count):

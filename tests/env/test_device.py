@@ -33,7 +33,10 @@ WITHIN = 1e-4  # Pa, that is 1e-6 mbar
 WORN = {"worn": 1.0, "delayed": 1.0, "vented": 0.5, "target_steps": 1.0}
 CASES: dict[str, tuple[str, dict[str, Any]]] = {
     "ordinary": ("EPValve-v0", {}),
-    "effects, delay and duty": ("EPValvePWM-v0", {"conditions": WORN, "autoreset_mode": "SameStep"}),
+    "effects, delay and duty": (
+        "EPValvePWM-v0",
+        {"conditions": WORN, "parameters": {"w_delay": (-0.5, 1.0)}, "autoreset_mode": "SameStep"},
+    ),
 }
 NAMES = ("p2", "observation", "reward", "terminated", "truncated", "deviation", "shown")
 

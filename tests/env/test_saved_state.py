@@ -16,7 +16,9 @@ from epv_env.saved_state import SavedState, StateError, restore_state, save_stat
 
 KINDS = {
     "nominal": {"parameters": "ten_percent"},
-    "with a delay": {"effects": {"command_delay": (0.0, 0.01), "circuit_leak": 1e-7}},
+    "with a delay": {
+        "effects": {"command_delay": {"t_delay": (0.0, 0.01), "w_delay": 0.5}, "circuit_leak": 1e-7}
+    },
     "with signals": {"target_bar": lambda t: 8.0 + 0.1 * t, "supply": 12.0},
 }
 

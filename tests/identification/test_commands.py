@@ -116,7 +116,9 @@ def test_the_environment_draws_its_plants_from_the_joint_region(finished):
     assert np.max(distances) > 0.5 * region.chi_square
 
 
-def test_a_second_run_gives_the_same_plant_and_searches_nothing(finished, campaign, monkeypatch, capsys):
+def test_a_second_run_gives_the_same_plant_and_searches_nothing(
+    finished, campaign, monkeypatch, tmp_path, capsys
+):
     before = (finished / "plant.json").read_bytes()
 
     def search(*_):
@@ -127,8 +129,12 @@ def test_a_second_run_gives_the_same_plant_and_searches_nothing(finished, campai
     arguments = [str(campaign), "--out", str(finished), "--starts", "2"]
     assert main(["run", "--stage", "confidence", *arguments]) == 0
     assert (finished / "plant.json").read_bytes() == before
-    assert main(["run", "--stage", "calibrate", *arguments, "--seed", "1"]) == 2  # it has other starts
-    assert "searches.jsonl holds results with seed 0, not 1" in capsys.readouterr().err
+    # Another seed has other starts: what is finished is neither used nor lost.
+    assert main(["run", "--stage", "calibrate", *arguments, "--seed", "1"]) == 2
+    assert "holds results with seed 0, not 1" in capsys.readouterr().err
+    elsewhere = ["run", str(campaign), "--out", str(tmp_path / "other"), "--stage", "calibrate"]
+    with pytest.raises(AssertionError, match="done again"):
+        main([*elsewhere, "--seed", "1"])
 
 
 def test_a_campaign_that_lacks_recordings_is_still_identified(campaign, tmp_path, capsys):

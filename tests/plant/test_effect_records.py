@@ -38,8 +38,10 @@ def unread_constants(constants: tuple[Constant, ...]) -> list[str]:
 
 def unused_symbols(record: Effect) -> list[str]:
     """Sizes of an effect without constants of its own that nothing outside of its record uses."""
-    text = source(PLANT)
-    return [s for s in record.symbols if not record.rows and f'"{s}"' not in text]
+    text, own = source(PLANT), source(PLANT / "effects")
+    return [
+        s for s in record.symbols if not record.rows and f'"{s}"' not in text and f'p["{s}"]' not in own
+    ]
 
 
 def test_every_size_is_a_parameter_that_is_off_at_zero():

@@ -25,7 +25,7 @@ from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.primitives import CRITICAL_RATIO, KAPPA, mass_flux
 from epv_env.plant.simulate import energised, simulate
 from epv_env.plant.valves import Valves
-from tests.reference.hybrid_automaton import delayed_schedule
+from tests.reference.hybrid_automaton import delayed_schedule, edge_delays
 from tests.reference.reference_simulation import simulate_reference
 from tests.reference.schedule import away_from_events, largest_difference, pulses
 
@@ -76,7 +76,8 @@ def test_sizes_of_zero_are_no_effects():
 
 def assert_scipy_agrees(p: Parameters) -> None:
     """The kernel's readings of one opening are those of the reference."""
-    schedule = delayed_schedule(pulses(p, opening=0.1, count=1, duration=0.3), p["t_delay"])
+    schedule = pulses(p, opening=0.1, count=1, duration=0.3)
+    schedule = delayed_schedule(schedule, edge_delays(schedule))
     time = np.arange(0.0, 0.3, 1 / RATE)
     reference = simulate_reference(schedule, time, rtol=1e-8)
     U = np.where((time >= 0.05 - 1e-9) & (time < 0.15 - 1e-9), 0.0, 24.0)

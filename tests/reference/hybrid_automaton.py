@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.coefficients import coefficients
-from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current
+from epv_env.plant.effects.measurement import command_delays
 from epv_env.plant.effects.registry import effect_constants, has_effects, with_laws
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
@@ -72,16 +73,23 @@ def piecewise_schedule(
     )
 
 
-def delayed_schedule(schedule: Schedule, delay: float) -> Schedule:
-    """The schedule with every change of its inputs but the first later by `delay` [s].
+def delayed_schedule(schedule: Schedule, delays: NDArray) -> Schedule:
+    """The schedule with every change of its inputs but the first later by its delay (segments - 1,) [s].
 
-    Only the voltage may change: inputs that act at once have no place in a delayed schedule.
+    A change that a later one overtakes, or that comes after the end, is lost. Only the voltage may
+    change: inputs that act at once have no place in a delayed schedule.
     """
-    if delay == 0 or len(schedule.borders) == 2:
-        return schedule
-    end = schedule.duration
-    borders = np.concatenate([[0.0], np.minimum(schedule.borders[1:-1] + delay, end), [end]])
-    return replace(schedule, borders=borders)
+    later, end = schedule.borders[1:-1] + delays, schedule.duration
+    before = np.minimum.accumulate(np.append(later, end)[::-1])[::-1]
+    acts = later < before[1:]
+    borders = np.concatenate([[0.0], later[acts], [end]])
+    inputs = Inputs(*(field[np.append(True, acts)] for field in schedule.inputs))
+    return replace(schedule, borders=borders, inputs=inputs)
+
+
+def edge_delays(schedule: Schedule) -> NDArray:
+    """The command delay of each change of a schedule's voltage, (segments - 1,) [s]."""
+    return np.where(schedule.inputs.U[1:] > OFF_VOLTAGE, *command_delays(schedule.parameters))
 
 
 RightHandSide = Callable[[NDArray, NDArray, NDArray, NDArray, float, float], NDArray]

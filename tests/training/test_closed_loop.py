@@ -8,16 +8,19 @@ from typing import Any
 import numpy as np
 import pytest
 
+from controllers.hysteresis import Hysteresis
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from epv_env.common.units import BAR, GRAM
 from epv_env.plant.plantfile import Plant
 from epv_env.signals import RecordedConsumption
+from identification.commands import gap
 from identification.gap.search.onset import Onset
 from identification.recordings.log_files import Drive, Log
-from training import closed_loop
+from identification.valve_gap import operation
+from training import closed_loop, epv
 from training.closed_loop import KINDS, ClosedLoop, consumption, sentence
-from training.drives import drives
+from training.drives import drives, write_log
 
 PLANT, TARGET = Plant.calibrated(), 8.0
 policy = cache(load_policy)
@@ -81,9 +84,9 @@ def test_nothing_is_claimed_without_an_effect():
 
 def test_only_drives_in_which_the_cause_acts_count():
     loop = ClosedLoop(logged(), PLANT, policy())
-    kept = SimpleNamespace(labels=("lag",), title="lag of p2")
+    model = SimpleNamespace(labels=("lag",), title="lag of p2")
     found: Any = SimpleNamespace(
-        onset=Onset("drive-1.csv", 0.99, None, "drive-1.csv", "drive-1.csv"), kept=kept
+        onset=Onset("drive-1.csv", 0.99, None, "drive-1.csv", "drive-1.csv"), model=model
     )
     (section,) = loop.sections(found, with_effect(tau_p2=0.02))
     table: Any = section.blocks[0]
@@ -98,3 +101,18 @@ def test_a_controller_that_wrote_no_log_is_refused_before_the_diagnosis():
         ClosedLoop(log, PLANT, tuned("PWM"))
     with pytest.raises(ValueError, match="decides each 5 ms"):
         ClosedLoop(replace(log, period=0.01), PLANT, policy())
+
+
+def test_the_command_adds_the_section_to_the_report_of_a_log(tmp_path, monkeypatch):
+    controller = Hysteresis(open_below=-0.3, shut_above=0.0)
+    write_log(tmp_path / "log", controller, PLANT, [1], duration=2.0)
+    asked: dict[str, Any] = {}
+    monkeypatch.setattr(operation, "diagnose_log", lambda *folders, **options: asked.update(options))
+    monkeypatch.setattr(gap, "say", lambda *_: None)
+    monkeypatch.setattr(gap, "next_step", lambda _: None)
+    words = ["gap", str(tmp_path / "log"), "--logs", "--out", str(tmp_path / "out")]
+    monkeypatch.setattr("sys.argv", ["epv", *words, "--controller", "hysteresis"])
+    assert epv.main() == 0
+    assert asked["more"].__self__.controller.name == "hysteresis"
+    monkeypatch.setattr("sys.argv", ["epv", *words, "--controller", "PWM"])
+    assert epv.main() == 2  # it cannot have written a log

@@ -20,14 +20,13 @@ from controllers.pulse import InformedPulse
 from controllers.tuned import tuned
 from docs.examples.relay import Relay
 from docs.studies.device.study import controllers, on_cpu
-from epv_env.device.kernels import P2, episodes_kernel
+from epv_env.device.kernels import episodes_kernel
 from epv_env.period import rules_of
 from tests.env.test_device import compiles, simulated
 from training.evaluation import batches
 from training.evaluation.metrics import METER, count
 from training.evaluation.on_device import run_begun
-from training.evaluation.rollout import NOTHING, make_env
-from training.rare.episodes import Episodes
+from training.evaluation.rollout import NOTHING
 
 pytestmark = pytest.mark.training
 
@@ -78,25 +77,6 @@ def test_the_kernel_compiles_for_an_accelerator(name, monkeypatch):
     )  # fmt: skip
     kernel = episodes_kernel(type(controller).decide, controller.record, count, True)
     assert compiles(kernel, arguments, monkeypatch)
-
-
-def test_a_rare_episode_is_the_same_on_a_device(monkeypatch):
-    """The device gets its start and its noise, which follow from its numbers."""
-    given: dict[str, Any] = {}
-
-    def stub(controller, begun, settings, *, periods, noise):
-        given.update(begun=begun, periods=periods, noise=noise)
-        return np.zeros(2, METER)
-
-    monkeypatch.setattr("training.evaluation.on_device.run_begun", stub)
-    episodes = Episodes(controller=tuned("hysteresis"), duration=0.6, options={}, device="cuda")
-    normals = np.random.default_rng(0).standard_normal((2, sum(vars(episodes.moves).values())))
-    episodes.worst(normals)
-    task = make_env(episodes.controller, 2).task
-    task.begin_from(np.arange(2), episodes.starts(normals))
-    np.testing.assert_array_equal(given["noise"][:, : task._noise.shape[1]], task._noise)
-    np.testing.assert_array_equal(given["begun"].numbers[P2], task.valves.state.p2)
-    assert given["periods"] == 120 < given["noise"].shape[1]
 
 
 def part(device: str) -> batches.Batch:

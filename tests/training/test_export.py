@@ -14,7 +14,6 @@ import pytest
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import read_policy
 from epv_env.observation import CENTRE, INDEX, P3_LAGS, SCALE, contract, decode
-from tests.controllers.test_monitor import white_model
 from tests.training.exports import (
     GOOD,
     column,
@@ -28,11 +27,9 @@ from tests.training.exports import (
     sanitisers,
 )
 from training.commands.export import FILES
-from training.deploy import monitor_c
 from training.deploy.agreement import follow, visit
 from training.deploy.c_code import MEMORY
 from training.deploy.compiled import CompiledPolicy, build, library
-from training.deploy.translation import ExportError
 
 pytestmark = [
     pytest.mark.training,
@@ -242,26 +239,6 @@ def good_but(*more: str):
     return lambda tmp_path: [str(random_policy(tmp_path / "policy")), *more]
 
 
-def with_a_monitor(tmp_path: Path) -> list[str]:
-    path = tmp_path / "monitor.json"
-    white_model().save(path)
-    path.write_text(path.read_text().replace("second", "x y"))
-    return [str(random_policy(tmp_path / "policy")), "--monitor", str(path)]
-
-
-def test_a_monitor_goes_out_compiled_and_the_contract_names_its_effects(tmp_path):
-    white_model().save(tmp_path / "monitor.json")
-    out = tmp_path / "ecu"
-    assert (
-        export(random_policy(tmp_path / "policy"), out, "--monitor", str(tmp_path / "monitor.json")) == 0
-    )
-    assert {path.name for path in out.iterdir()} >= set(monitor_c.FILES)
-    named = json.loads((out / "contract.json").read_text())["monitor"]["effects"]
-    assert named == ["first", "second", "unknown", "return"]
-    with pytest.raises(ExportError, match="false does not compile the exported code"):
-        monitor_c.compiled_sources(white_model(), ["false"])
-
-
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
@@ -269,7 +246,6 @@ def test_a_monitor_goes_out_compiled_and_the_contract_names_its_effects(tmp_path
         (folder_without_weights, "give a folder that training wrote"),
         (good_but("--compiler", "no-such-cc"), "there is no C compiler 'no-such-cc' here"),
         (good_but("--compiler", "false"), "false does not compile the exported code"),
-        (with_a_monitor, "monitor.json: 'x y' is no name"),
         (good_but("--episodes", "0"), "argument --episodes: 0 must be a whole number"),
         (good_but("--out", "/dev/null/x"), "is not a folder"),
         (good_but("--duration", "0.1"), "0.1 must be a number from 0.55"),

@@ -16,7 +16,7 @@ LOG = "log --controller hysteresis --drives 2 --duration 10 --out {}"
 COMMANDS = {
     "log": LOG,
     "export": "export plant --compiler= --out {}",
-    "rare": "rare --quick --controller hysteresis --workers 1 --out {}",
+    "sweep": "sweep --quick --workers 1 --out {}",
     "train": "train --quick --out {}",
     "sim-to-real": "sim-to-real --quick --out {}",
     "run": "run {campaign} --stage quality --out {}",
@@ -66,14 +66,14 @@ class Killed(BaseException):
 
 
 def test_what_was_killed_is_repeated_to_the_undisturbed_result(given, tmp_path, monkeypatch):
-    words, out = COMMANDS["rare"].format(tmp_path / "out", **given), tmp_path / "out"
+    words, out = COMMANDS["sweep"].format(tmp_path / "out", **given), tmp_path / "out"
     assert epv(words) == 0
     undisturbed = contents(out)
     shutil.rmtree(out)
     replace = os.replace
 
     def kill(source: Path, target: Path) -> None:
-        if Path(target).name == "tail.csv":
+        if Path(target).name == "points.csv":
             raise Killed
         replace(source, target)
 
@@ -85,6 +85,6 @@ def test_what_was_killed_is_repeated_to_the_undisturbed_result(given, tmp_path, 
         patch.setattr(Path, "unlink", keep)
         with pytest.raises(Killed):
             epv(words)
-    assert [name for name in contents(out) if name.startswith(".tail.csv.")]
+    assert [name for name in contents(out) if name.startswith(".points.csv.")]
     assert epv(words) == 0
     assert contents(out) == undisturbed

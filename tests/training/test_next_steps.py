@@ -25,7 +25,6 @@ VERDICTS = {
 ENDED = {
     "bench --out 'my bench'": "run",
     "bench --out next --programme next.json --plant valve.json": "run",
-    f"closed-loop log --controller policy --out {KNOWN}": "train",
     "compare --controllers PWM PPO=policy": "sweep",
     "compare --quick": "sweep",
     "export policy --out c": "export",
@@ -34,7 +33,6 @@ ENDED = {
     "import a.csv --out campaign --plant valve.json": "run",
     "log --out log": "monitor",
     "monitor log --out monitor": "gap",
-    "rare --controller PWM --plant valve.json": "compare",
     "run campaign --out results": "gap",
     "run campaign --out results --stage quality --seed 3": "run",
     "sim-to-real --out loop": "compare",

@@ -143,7 +143,7 @@ def test_another_effect_is_refused_wherever_the_first_was_stopped(tmp_path, monk
 def test_deployments_belong_to_both_valves_and_the_policy(finished):
     header, *lines = (finished / "after" / "deployments.jsonl").read_text().splitlines()
     subject = json.loads(header)["subject"]
-    assert subject[MEASURED]["plant"]["effects"] == {"command_delay": {"t_delay": 0.006}}
+    assert subject[MEASURED]["plant"]["effects"] == {"command_delay": {"t_delay": 0.006, "w_delay": 0.0}}
     assert subject[SIMULATED]["plant"]["parameters"]
     digest = policy_digest(finished / "after")
     assert any(f"PPO {digest}" in json.loads(line)["name"] for line in lines)

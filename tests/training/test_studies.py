@@ -1,23 +1,27 @@
 """The studies of controllers in their short form: result files, pictures, and the page's tables."""
 
-from argparse import Namespace
+import shutil
 from dataclasses import replace
 
+import numpy as np
 import pandas as pd
 import pytest
 
 pytest.importorskip("stable_baselines3")
 
-from controllers.policy import load_policy
+from controllers.policy import TRAINED, load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE
 from docs.studies.comparison import study as comparison
 from docs.studies.sim_to_real import study as sim_to_real
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant, save_plant
+from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.session import run_programme
+from identification.commands import gap
+from training.commands import sim_to_real as command
+from training.evaluation.rollout import run_episodes
 
 pytestmark = [pytest.mark.training, pytest.mark.slow]
 
@@ -34,32 +38,37 @@ def test_the_comparison(tmp_path, monkeypatch):
 def test_the_loop(tmp_path, monkeypatch):
     """With a diagnosis that is right, and the package's policy for each training."""
 
-    def diagnosed(campaign, out, *, without):
-        true = sim_to_real.true_valve(sim_to_real.CASES[0])
+    def diagnosed(options):
+        true = load_plant(options.campaign.parent / sim_to_real.WITHHELD)
         answer = Alternative(name="piston_friction", probability=1.0, region=true.region)
-        save_plant(replace(true, diagnosis=Mixture(alternatives=(answer,))), out / "plant.json")
-        (out / "gap.json").write_text('{"verdict": "known"}')
+        save_plant(replace(true, diagnosis=Mixture(alternatives=(answer,))), options.out / "plant.json")
+        (options.out / "gap.json").write_text('{"verdict": "known"}')
 
-    monkeypatch.setattr(sim_to_real, "diagnose_campaign", diagnosed)
-    monkeypatch.setattr(sim_to_real, "trained", lambda *plants, **options: load_policy())
+    def trained(folder, *plants, **options):
+        shutil.copytree(TRAINED, folder, dirs_exist_ok=True)
+        return load_policy()
+
+    monkeypatch.setattr(gap, "run", diagnosed)
+    monkeypatch.setattr(command, "trained", trained)
     monkeypatch.setattr(sim_to_real, "run_programme", lambda p, each, **_: run_programme(p, each))
     assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0
     text = (tmp_path / PAGE).read_text(encoding="utf-8")
     assert "| piston friction | known: piston friction 1.00 | " in text
     assert len(pd.read_csv(tmp_path / "results.csv")) == len(sim_to_real.ARMS)
-    assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0  # from the journal alone
+    assert sim_to_real.main(["--quick", "--out", str(tmp_path)]) == 0  # from the journals alone
 
 
 def test_an_uneven_lag_without_unevenness_is_the_environment_s_own():
-    case = sim_to_real.Case(name="even", sizes={"tau_p2": 0.02})
-    options = Namespace(episodes=4, duration=1.0)
-    valve = Parameters.calibrated().replace(**case.sizes)
-    true = Plant(parameters=valve, region=Region(centre=valve))
+    parameters = Parameters.calibrated().replace(tau_p2=0.02)
+    plant = Plant(parameters=parameters, region=Region(centre=parameters))
     policy = tuned("adaptive pulse")
-    alone = sim_to_real.measured(policy, case, true, options)
     even, uneven = (sim_to_real.UnevenLag(policy, share) for share in (0.0, 0.5))
-    assert sim_to_real.measured(even, case, true, options) == alone
-    assert sim_to_real.measured(uneven, case, true, options) != alone
+    alone, same, other = (
+        run_episodes(each, seeds=range(4), duration=1.0, options={"plant": plant}).rms_bar
+        for each in (policy, even, uneven)
+    )
+    np.testing.assert_array_equal(same, alone)
+    assert np.any(other != alone)
 
 
 def test_plain_randomisation_draws_one_or_two_effects_of_the_whole_catalogue():

@@ -18,7 +18,6 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import Annotated, Any
 
-from controllers.monitor import Monitor, MonitorModel
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import WEIGHTS_FILE, read_contract
 from epv_env.common.command_line import NextStep, beside
@@ -27,7 +26,7 @@ from epv_env.common.options import Count, Folder, JudgedSeconds, PlantFile
 from epv_env.common.results_folder import LOCK_FILE
 from epv_env.plant.plantfile import Plant, load_plant
 from training.deploy import agreement as verdict
-from training.deploy import compiled, monitor_c
+from training.deploy import compiled
 from training.deploy.c_code import CODE, Export, deployment_contract, sources
 from training.deploy.fmu.archive import fmu
 from training.deploy.fmu.models import plant_model, policy_model
@@ -46,7 +45,6 @@ class Options:
     what: Annotated[str, f"a folder that training wrote, or `{PLANT}`"]
     _: KW_ONLY
     out: Annotated[Folder, "folder to write"]
-    monitor: Annotated[Path | None, "monitor.json of `epv monitor`: its C code, too"] = None
     fmu: Annotated[bool, "an FMU of the policy, too"] = False
     plant: Annotated[
         PlantFile, "plant file: exported, or nominal for a policy (default: the report's)"
@@ -72,17 +70,8 @@ def run(options: Options) -> None:
     check_free(options.out)
     compiler = compiled.find_compiler(options.compiler)
     export = prepared(Path(options.what), load_plant(options.plant))
-    if options.monitor is not None and export.period != Monitor.period:
-        raise ExportError(
-            f"{options.what} decides each {1e3 * export.period:g} ms, but a monitor counts periods of "
-            f"{1e3 * Monitor.period:g} ms: export it without --monitor"
-        )
-    model = None if options.monitor is None else MonitorModel.load(options.monitor)
     files, report = verified(export, compiler, options.episodes, options.duration)
     contract = deployment_contract(export)
-    if model is not None:
-        files |= monitor_c.compiled_sources(model, compiler)
-        contract["monitor"] = {"effects": monitor_c.effects_of(model)}
     files["contract.json"] = json.dumps(contract, indent=1) + "\n"
     files["report.json"] = json.dumps(report, indent=1) + "\n"
     content = {name: text.encode() for name, text in files.items()}
@@ -148,7 +137,7 @@ def verified(
 def check_free(folder: Path) -> None:
     """Raises ExportError or OSError if the folder holds anything but files of an earlier export."""
     there = {path.name for path in folder.iterdir()} if folder.exists() else set()
-    if foreign := sorted(there - FILES - {*monitor_c.FILES, LOCK_FILE}):
+    if foreign := sorted(there - FILES - {LOCK_FILE}):
         raise ExportError(
             f"{folder} holds {foreign[0]!r}, which no export writes: give --out a new or empty folder"
         )

@@ -3,7 +3,7 @@
     epv log --out LOGS                                                    # a valve that stays as it is
     epv log --effect piston_friction --from-drive 5 --out LOGS            # one that changes
 
-`epv gap LOGS --logs`, `epv monitor LOGS` and `epv closed-loop LOGS` read it.
+`epv gap LOGS --logs` and `epv monitor LOGS` read it.
 """
 
 from dataclasses import dataclass

@@ -8,22 +8,21 @@ What the monitor knows of the report's valve is shipped. Another plant is simula
 effect of the catalogue: a minute or two, once.
 """
 
-from collections.abc import Collection, Sequence
+from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
-from typing import Annotated, Any, TypedDict
+from typing import Annotated
 
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
 
-from controllers.monitor import RETURN, SHIPPED, UNKNOWN, Change, Monitor, MonitorModel
 from epv_env.common.command_line import NextStep, beside
-from epv_env.common.files import read_json
 from epv_env.common.options import Folder, Number, PlantFile, Seed
 from epv_env.common.units import BAR
 from epv_env.plant.plantfile import load_plant
-from identification.gap.report.gap_json import FORMAT
+from identification.monitor.model import RETURN, SHIPPED, MonitorModel
+from identification.monitor.monitor import Change, Monitor
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.recording import rules_of
 from training.evaluation.plots import save_figure
@@ -31,36 +30,8 @@ from training.monitoring import monitor_model
 
 MODEL, FIGURE = "monitor.json", "monitor.png"
 """What is written."""
-START = 1.0
-"""Time up to which a change has come before the start [s]."""
 LIKELY = 0.05
 """Probability from which a cause is named."""
-
-
-class _Began(TypedDict):
-    drive: str
-    earliest: str
-    latest: str
-
-
-class _Cause(TypedDict):
-    effects: list[str]
-    onset: dict[str, _Began]
-
-
-class _Levels(TypedDict):
-    form: dict[str, Any]
-
-
-class _Finding(TypedDict):
-    """What is compared of gap.json."""
-
-    verdict: str
-    ambiguity_set: list[list[str]]
-    absorbed: list[str]
-    onset: Any
-    causes: list[_Cause]
-    levels: _Levels
 
 
 @dataclass(frozen=True)
@@ -70,7 +41,6 @@ class Options:
     log: Annotated[Path, "folder with log.json (docs/reference/files.md)"]
     _: KW_ONLY
     model: Annotated[Path | None, f"{MODEL} of an earlier call; default: of --plant"] = None
-    gap: Annotated[Path | None, "gap.json of the same log: do both agree, or why not"] = None
     false_alarms: Annotated[float, Number(float, 1e-6, 100.0), "per hour of operation"] = 0.01
     out: Folder = Path("runs/monitor")
     plant: Annotated[
@@ -84,7 +54,6 @@ def run(options: Options) -> None:
     plant = load_plant(options.plant)
     log = read_log(options.log, rules_of(plant))
     log.check_period(Monitor.period, "the monitor counts periods of")
-    finding = options.gap and _diagnosis_of(log, options.gap)
     if options.plant and not options.model:
         model = monitor_model(plant, seed=options.seed)
     else:
@@ -94,19 +63,7 @@ def run(options: Options) -> None:
     ends = follow(monitor, log)
     save_figure(picture(monitor, ends), options.out / FIGURE)
     print(*sentences(monitor, log, ends), sep="\n")
-    if finding:
-        print(agreement(monitor, log, ends, finding))
     print(f"written: {options.out / FIGURE}")
-
-
-def _diagnosis_of(log: Log, path: Path) -> _Finding:
-    """A diagnosis of the log. Raises ValueError for another file, and for that of another log."""
-    content = read_json(path, _Finding, version=FORMAT, remedy="diagnose the log")
-    began = [onset for cause in content["causes"] for onset in cause["onset"].values()]
-    drives = {str(file) for onset in began for file in onset.values()}
-    if unknown := sorted(drives - {drive.file for drive in log.drives}):
-        raise ValueError(f"{path} names {unknown[0]}, which the log does not have: diagnose this log")
-    return content
 
 
 def next_step(options: Options) -> NextStep:
@@ -153,59 +110,6 @@ def _began(change: Change, log: Log, ends: Sequence[float]) -> tuple[str, float]
     """File of the drive in which a change began, and when in it [s]."""
     number = min(int(np.searchsorted(ends, change.onset, side="right")), len(ends) - 1)
     return log.drives[number].file, change.onset - (ends[number - 1] if number else 0.0)
-
-
-def agreement(monitor: Monitor, log: Log, ends: Sequence[float], content: _Finding) -> str:
-    """What the diagnosis of the same log says otherwise, and why; content: of gap.json."""
-    named = {name for effects in content["ambiguity_set"] for name in effects}
-    changes = {next(iter(change.causes)): change for change in reversed(monitor.changes)}
-    seen = changes.keys() - {RETURN}
-    said = [f"names {name}, {_unseen(monitor, name, seen, content)}" for name in sorted(named - seen)]
-    said += [
-        f"does not name {'a change without a name' if name == UNKNOWN else name}, "
-        f"{_unnamed(changes[name], name, named, content)}"
-        for name in sorted(seen - named)
-    ]
-    files = [drive.file for drive in log.drives]
-    for name in sorted(named & seen):
-        own, other = _began(changes[name], log, ends)[0], _drive_with(name, content, files[0])
-        if not files.index(other["earliest"]) <= files.index(own) <= files.index(other["latest"]):
-            said.append(
-                f"has {name} begin in {other['drive']}, not {own}: it weighs whole drives, not openings"
-            )
-    if not said:
-        return f"The diagnosis agrees: {content['verdict']}."
-    return f"The diagnosis ({content['verdict']}) {'; it '.join(said)}."
-
-
-def _unseen(monitor: Monitor, name: str, seen: Collection[str], content: _Finding) -> str:
-    """Why the monitor has not told an effect."""
-    hidden = any(f"{name} (p2)" in label for label in content["levels"]["form"])
-    if name not in monitor.model.effects or hidden:
-        return "which hardly shows in the features of an opening, which the monitor reads"
-    if not content["onset"]:
-        return "which acts in all drives, and the monitor takes it for the valve's own offset"
-    if seen:
-        return "where the monitor names what looks alike: it knows effects of usual size only"
-    return "for which the monitor needs more openings, or a larger effect, at the stated false alarms"
-
-
-def _unnamed(change: Change, name: str, named: Collection[str], content: _Finding) -> str:
-    """Why the diagnosis has not named what the monitor tells."""
-    if change.onset < START:
-        return "by which the valve differs from the start on: there the four parameters are refitted"
-    if name in {label.split(" ")[0] for label in content["absorbed"]}:
-        return "which recalibration or the unknown consumption absorbs"
-    if named:
-        return "which looks like what it names: it simulates every effect and its law"
-    return "since it allows for a misfit that no model is free of; the monitor compares openings alone"
-
-
-def _drive_with(name: str, content: _Finding, first: str) -> _Began:
-    """The first drive with an effect, according to gap.json; first: file of the log's first drive."""
-    onsets = [o for c in content["causes"] for o in c["onset"].items() if name in c["effects"]]
-    throughout = _Began(drive=first, earliest=first, latest=first)
-    return next((own for label, own in onsets if label.split(" ")[0] == name), throughout)
 
 
 def picture(monitor: Monitor, ends: list[float]) -> Figure:

@@ -8,7 +8,7 @@ simulation and diagnosis see what a user sees. Finished steps in --out are kept.
 
 import json
 import sys
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import asdict, dataclass
 from importlib.metadata import version
 from pathlib import Path
@@ -25,16 +25,16 @@ from controllers.tuned import load_tunings
 from epv_env.common.command_line import NextStep, beside
 from epv_env.common.extras import DISTRIBUTION
 from epv_env.common.files import Journal, decoded, digest, write_json, write_text
-from epv_env.common.options import Count, Folder, JudgedSeconds, Quick, Seed
+from epv_env.common.options import Count, Folder, JudgedSeconds, Names, Quick, Seed
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
-from epv_env.plant.region import Alternative, Mixture, Region
+from epv_env.plant.region import Mixture
 from epv_env.reward import RewardWeights
 from identification.bench.programmes import SUITES
 from identification.commands import bench
 from identification.gap.report.gap_json import GAP
 from identification.recordings.campaign_files import FILE_NAME
-from training.evaluation.named import named_controllers
+from training.evaluation.named import HELP, named_controllers
 from training.evaluation.plots import COLOURS, plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
 from training.studies.comparison import Results, as_text, compare, differences, rows
@@ -52,15 +52,18 @@ SIMULATED, MEASURED = "simulated", "measured"
 CORRECTED = "plant.json"
 """Plant file that a diagnosis writes."""
 
+Mounted = Callable[[Controller], Controller]
+"""Puts a policy on the bench's valve."""
+
 QUICK: dict[str, Any] = {
     "out": Path("runs/quick-sim-to-real"), "timesteps": 8192, "episodes": 8, "duration": 1.0,
     "suite": "report",
 }  # fmt: skip
 
 BEFORE, AFTER = "before", "after"
-"""Stages: trained on the nominal plant, retrained on the corrected one."""
+"""Stages: trained on the nominal plant, retrained on the plants that the diagnosis holds possible."""
 REGION = "ten_percent"
-"""Plants around the simulated one that PPO trains on: no wider, so that a gap is felt. Policies are
+"""Plants around the nominal one that PPO trains on: no wider, so that a gap is felt. Policies are
 deployed on the plant itself (C1, C2), and on plants of this region around it (C3)."""
 MARKS = {
     f"{stage}, {place}": (marker, inside, 7)
@@ -86,21 +89,19 @@ class Options:
     episodes: Annotated[Count, "episodes of each deployment"] = 256
     duration: JudgedSeconds = 6.0
     suite: Annotated[str, {"choices": SUITES}, "recordings that the bench makes"] = "diagnosis"
+    controllers: Annotated[Names, f"beside the policies: {HELP}"] = tuple(load_tunings())
     quick: Quick = False
 
 
 def run(options: Options) -> None:
-    """The four steps, those that --out lacks; write sim-to-real.json, performance.csv and the picture.
+    """The steps that --out lacks; write sim-to-real.json, performance.csv and the picture.
 
     Raises ValueError for a folder that was begun with other options, or an effect that cannot be used.
     """
-    from identification.commands import gap  # with the extra `identification`
-
     out = options.out
     settings = {name: v for name, v in asdict(options).items() if name not in ("out", "quick")}
-    settings["software"] = version(DISTRIBUTION)
+    settings |= {"controllers": list(options.controllers), "software": version(DISTRIBUTION)}
     check_options(out, settings, "sim-to-real run")
-    print("[1 of 4: the bench records its valve]", file=sys.stderr)
     recording = bench.Options(
         suite=options.suite, effect=[options.effect], seed=options.seed,
         out=out / CAMPAIGN, truth=out / WITHHELD,
@@ -108,15 +109,25 @@ def run(options: Options) -> None:
     bench.true_parameters(recording, load_plant(None))  # refuses an effect that cannot be used
     write_options(out, settings)  # before what it belongs to: a run may stop anywhere
     if not (out / CAMPAIGN / FILE_NAME).exists():  # which the bench writes last
+        print("[the bench records its valve]", file=sys.stderr)
         bench.run(recording)
-    print("[2 of 4: train on the nominal plant, deploy]", file=sys.stderr)
-    results = deployed(BEFORE, load_plant(None), options)
-    print("[3 of 4: diagnose the campaign]", file=sys.stderr)
+    report(loop(options), options)
+
+
+def loop(options: Options, mounted: Mounted = lambda policy: policy) -> Results:
+    """Train, deploy on the valve that the bench in --out has recorded, diagnose, retrain, deploy.
+
+    mounted: of `deployed`.
+    """
+    from identification.commands import gap  # with the extra `identification`
+
+    out = options.out
+    results = deployed(BEFORE, load_plant(None), REGION, options, mounted)
     if not (out / DIAGNOSIS / GAP).exists():  # written last, after the corrected plant
+        print("[diagnose the campaign]", file=sys.stderr)
         gap.run(gap.Options(out / CAMPAIGN, out=out / DIAGNOSIS, seed=options.seed))
-    print("[4 of 4: train on the corrected plant, deploy]", file=sys.stderr)
-    results |= deployed(AFTER, load_plant(out / DIAGNOSIS / CORRECTED), options)
-    report(results, options)
+    corrected = load_plant(out / DIAGNOSIS / CORRECTED)
+    return results | deployed(AFTER, corrected, "diagnosis", options, mounted)
 
 
 def next_step(options: Options) -> NextStep:
@@ -126,15 +137,24 @@ def next_step(options: Options) -> NextStep:
     return NextStep("to compare both policies on the bench's valve", words, options.out / WITHHELD)
 
 
-def deployed(stage: str, simulated: Plant, options: Options) -> Results:
+def deployed(
+    stage: str, simulated: Plant, parameters: str | Mixture, options: Options, mounted: Mounted
+) -> Results:
     """Train on the simulated plant, then deploy in simulation and on the bench's valve.
 
     The classic controllers keep their tuning for the nominal plant.
+
+    Args:
+        stage: name of the training.
+        simulated: plant.
+        parameters: plants around it that are trained on.
+        options: of the loop.
+        mounted: puts the policy on the bench's valve, where the environment does not simulate all of it.
     """
-    folder, training = options.out / stage, {"seed": options.seed, "timesteps": options.timesteps}
-    policy = trained(folder, simulated, REGION, **training)
-    classic, digests = named_controllers(list(load_tunings()), Plant.calibrated())
-    controllers = {policy.name: policy, **classic}
+    print(f"[train and deploy: {stage}]", file=sys.stderr)
+    folder = options.out / stage
+    policy = trained(folder, simulated, parameters, seed=options.seed, timesteps=options.timesteps)
+    classic, digests = named_controllers(options.controllers, Plant.calibrated())
     digests[policy.name] = policy_digest(folder)
     scenario = EvaluationScenario(options={"scenario": SCENARIO})
     plants = {SIMULATED: simulated, MEASURED: load_plant(options.out / WITHHELD)}
@@ -142,8 +162,9 @@ def deployed(stage: str, simulated: Plant, options: Options) -> Results:
     journal = Journal(folder / "deployments.jsonl", {**about, "duration": options.duration})
     results: Results = {}
     for place, plant in plants.items():
+        own = mounted(policy) if place == MEASURED else policy
         results |= compare(
-            controllers, plant=plant, scenarios={f"{stage}, {place}": scenario},
+            {policy.name: own, **classic}, plant=plant, scenarios={f"{stage}, {place}": scenario},
             episodes=options.episodes, duration=options.duration, plant_sets=("calibrated", REGION),
             journal=journal, digests=digests,
         )  # fmt: skip
@@ -176,9 +197,8 @@ def report(results: Results, options: Options) -> None:
 
 
 def trained(
-    folder: Path, plant: Plant, parameters: str | Region | Mixture, *, seed: int, timesteps: int,
-    **validation: Any,
-) -> Controller:  # fmt: skip
+    folder: Path, plant: Plant, parameters: str | Mixture, *, seed: int, timesteps: int
+) -> Controller:
     """PPO trained on these plants, or as it was trained before.
 
     Raises ValueError for the folder of another training.
@@ -189,7 +209,6 @@ def trained(
         parameters: plants around it that are trained on.
         seed: of the training.
         timesteps: environment steps of the training.
-        validation: more of the arguments of `training.learners.ppo.train`.
     """
     plants = digest(json.dumps([plant_subject(plant), repr(parameters)]).encode())
     about = {"plants": plants, "seed": seed, "timesteps": timesteps}
@@ -200,22 +219,17 @@ def trained(
 
         weights = RewardWeights(switching=SWITCHING_PRICE)
         task = Task(plant=plant, scenario=SCENARIO, parameters=parameters, weights=weights)
-        train(
-            task, folder, seed=seed, timesteps=timesteps, resume=True,
-            provenance={"plant": plant.name}, **validation,
-        )  # fmt: skip
+        provenance = {"plant": plant.name}
+        train(task, folder, seed=seed, timesteps=timesteps, resume=True, provenance=provenance)
     return load_policy(folder, plant)
-
-
-def alternatives(plant: Plant) -> tuple[Alternative, ...]:
-    """What a diagnosis holds possible."""
-    return plant.diagnosis.alternatives if plant.diagnosis else ()
 
 
 def diagnosis_text(folder: Path) -> str:
     """Verdict and alternatives of the diagnosis in a folder."""
     verdict = decoded(folder / GAP, remedy=f"remove {folder}, and the diagnosis runs again")["verdict"]
-    best, *others = alternatives(load_plant(folder / CORRECTED))
+    diagnosis = load_plant(folder / CORRECTED).diagnosis
+    assert diagnosis is not None  # which every diagnosis writes
+    best, *others = diagnosis.alternatives
     first = f"{verdict}: {best.name.replace('_', ' ')} {best.probability:.2f}"
     return first + (f", {len(others)} more" if others else "")
 

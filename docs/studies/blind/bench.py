@@ -22,7 +22,13 @@ from identification.bench.session import (
 )
 from identification.recordings.recording import Campaign
 from identification.report_2003 import SAMPLING_RATE
-from tests.reference.hybrid_automaton import RightHandSide, Schedule, piecewise_schedule
+from tests.reference.hybrid_automaton import (
+    RightHandSide,
+    Schedule,
+    delayed_schedule,
+    edge_delays,
+    piecewise_schedule,
+)
 from tests.reference.reference_simulation import simulate_reference
 
 SUITE = tuple(
@@ -79,7 +85,10 @@ def run_programme(
     time = np.arange(len(U)) / SAMPLING_RATE
     start = initial_state(parameters, programme)
     schedule = piecewise_schedule(parameters, start, time, U=U[:-1], reservoir_volume=RESERVOIR_VOLUME)
-    schedule = _delayed(schedule, parameters["t_delay"], form_deviation, rng)
+    delays = edge_delays(schedule)
+    if np.any(delays):  # each switching is later by a delay of its own, by a controller's cycle
+        delays = delays * (1.0 + form_deviation * rng.uniform(-1.0, 1.0, len(delays)))
+    schedule = delayed_schedule(schedule, delays)
     state = _simulated(schedule, time, right_hand_side(form_deviation, other_forms))
     segment = np.searchsorted(schedule.borders[1:-1], time, side="left")
     inputs = np.ascontiguousarray([field[segment] for field in schedule.inputs])
@@ -97,21 +106,6 @@ def _start_temperature(trial: Trial, index: int, seed: int) -> float:
     uneven = np.random.default_rng([seed, trial.number, index, 4]).uniform(0.8, 1.2)
     warmed = 1.0 - np.exp(-(index + 1) / 3.0)
     return float(trial.winding_temperature_rise * uneven * warmed)
-
-
-def _delayed(
-    schedule: Schedule, delay: float, form_deviation: float, rng: np.random.Generator
-) -> Schedule:
-    """The schedule with every switching later by a delay of its own, by a controller's cycle.
-
-    delay: their mean [s].
-    """
-    inner = schedule.borders[1:-1]
-    if delay == 0 or len(inner) == 0:
-        return schedule
-    later = inner + delay * (1.0 + form_deviation * rng.uniform(-1.0, 1.0, len(inner)))
-    end = schedule.duration
-    return replace(schedule, borders=np.concatenate([[0.0], np.minimum(later, end), [end]]))
 
 
 def _simulated(schedule: Schedule, time: NDArray, rates: RightHandSide) -> State:

@@ -41,7 +41,8 @@ def score_trial(label: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -
     label: content of sealed.json. diagnosis: content of gap.json; None where it failed.
     """
     said = diagnosis or {"verdict": "failed"}
-    causes, named, set_ = said.get("causes", []), named_cause(said), named_set(said)
+    causes, named = said.get("causes", []), named_cause(said)
+    set_ = said.get("ambiguity_set", [])
     components = said.get("where", {}).get("component", {})
     listed = causes[:1] if said["verdict"] in NAMING_VERDICTS else []
     component = max(components, key=components.get) if any(components.values()) else ""
@@ -57,7 +58,7 @@ def score_trial(label: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -
         "truth_in_set": any(is_correct(label, effects) for effects in set_),
         "set_size": len(set_),
         "probability": sum(c["probability"] for c in causes if is_correct(label, c["effects"])),
-        "false_held": [name for name in held_effects(said) if name not in label["effects"]],
+        "false_name": bool(set(named) - set(label["effects"])),
         "component": component,
         "component_right": component in {component_of(cause) for cause in label["visible"]},
         FIRST: [[c["probability"], is_true(label, c["effects"])] for c in listed],
@@ -66,40 +67,16 @@ def score_trial(label: Mapping[str, Any], diagnosis: Mapping[str, Any] | None) -
     return score | {"well_judged": is_well_judged(score)}
 
 
-def held_effects(diagnosis: Mapping[str, Any]) -> tuple[str, ...]:
-    """Effects that are surely part of the truth, the surest first; the verdict `partial` names them."""
-    found = diagnosis.get("inclusion", {})
-    held = [name for name, probability in found.items() if probability >= 0.9]
-    return tuple(sorted(held, key=lambda name: -found[name]))
-
-
 def named_cause(diagnosis: Mapping[str, Any]) -> tuple[str, ...]:
-    """Effects that the verdict names; () where it names none.
-
-    `known` and `ambiguous` name the first listed cause, `partial` all effects that are held.
-    """
-    if diagnosis["verdict"] == "partial":
-        return held_effects(diagnosis)
+    """Effects of the first cause where the verdict names it; else ()."""
     causes = diagnosis.get("causes", [])
     return tuple(causes[0]["effects"]) if diagnosis["verdict"] in NAMING_VERDICTS and causes else ()
 
 
-def named_set(diagnosis: Mapping[str, Any]) -> list[tuple[str, ...]]:
-    """Causes of the ambiguity set; what a `partial` without a set names; [] if nothing is named."""
-    if diagnosis["verdict"] not in NAMING_VERDICTS:
-        return []
-    given = [tuple(effects) for effects in diagnosis.get("ambiguity_set", [])]
-    named = named_cause(diagnosis)
-    return given or ([named] if diagnosis["verdict"] == "partial" and named else [])
-
-
 def is_tied(label: Mapping[str, Any], diagnosis: Mapping[str, Any]) -> bool:
-    """Whether the first cause of `known` or `ambiguous` is as probable as a wrong one after it.
-
-    Its place is then chance. A `partial` names what is held, which has no rival of the same probability.
-    """
+    """Whether a named first cause is as probable as a wrong one after it: its place is chance."""
     causes = diagnosis.get("causes", [])
-    if diagnosis["verdict"] not in ("known", "ambiguous") or len(causes) < 2:
+    if not named_cause(diagnosis) or len(causes) < 2:
         return False
     least = causes[0]["probability"] - 1e-3  # no one acts on less
     rivals = [cause for cause in causes[1:] if cause["probability"] >= least]
@@ -130,14 +107,12 @@ def component_of(cause: str) -> str:
 def is_well_judged(trial: Mapping[str, Any]) -> bool:
     """Whether the verdict is correct, and the first cause where there is one to name.
 
-    Where the effect is struck, `unknown` is correct, or `partial` of truths.
+    Where the effect is struck, any word is correct but `known` and `no_gap`.
     """
     if trial["kind"] in (NOMINAL, ABSORBED):
         return trial["verdict"] == "no_gap"
     if trial["kind"] == EXCLUDED_EFFECT:
-        return trial["verdict"] == "unknown" or (
-            trial["verdict"] == "partial" and not trial["false_held"]
-        )
+        return trial["verdict"] in ("unknown", "ambiguous", "partial")
     return trial["named_right"]
 
 
@@ -185,8 +160,8 @@ def figures(trials: Sequence[dict[str, Any]]) -> dict[str, dict[str, Any]]:
         "First cause right, one cause": first_right(one),
         "First cause right, two causes": first_right(two),
         "Component right": share(t["component_right"] for t in caused),
-        "Effect struck from the catalogue: `unknown`": share(t["well_judged"] for t in struck),
-        "False effect held": share(t["false_held"] for t in trials),
+        "Effect struck from the catalogue: not `known`": share(t["well_judged"] for t in struck),
+        "False effect named": share(t["false_name"] for t in trials),
         "Diagnosis failed": share(t["verdict"] == "failed" for t in trials),
         "Mean probability on the truth": mean([t["probability"] for t in caused]),
         "Calibration error of the first cause": calibration_error(*answers(trials)),

@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import policy_digest
 from docs.studies.blind.forms import deviating_sizes
-from docs.studies.blind.score import named_cause, named_set
+from docs.studies.blind.score import named_cause
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal
@@ -129,10 +129,10 @@ def judged(valve: dict[str, Any], log: Path, found: dict[str, Any]) -> dict[str,
         "label": valve["label"],
         "verdict": found["verdict"],
         "named": named,
-        "told": valve["label"] not in found["absorbed"],
+        "told": valve["label"] not in found["not_identifiable"],
         "listed": [true] == [tuple(cause["effects"]) for cause in found["causes"][:1]],
         "right": named == true,
-        "in_set": true in named_set(found),
+        "in_set": true in map(tuple, found["ambiguity_set"]),
         "onset": began == first,
         "between": earliest <= first <= latest,
     }

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from scipy.stats import chi2
 
 from controllers.base import Controller
-from controllers.monitor import CONFIRMED, RETURN, SHIPPED, Monitor, MonitorModel
 from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
@@ -35,6 +34,8 @@ from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import load_plant
 from epv_env.plant.supply import Supply
 from epv_env.plant.valves import Valves
+from identification.monitor.model import RETURN, SHIPPED, MonitorModel
+from identification.monitor.monitor import CONFIRMED, Monitor
 from training.drives import DRIVE, drives
 
 FOLDER = Path(__file__).parent

@@ -1,7 +1,13 @@
-"""Sensors that fail, alone and in pairs, from a random instant: worst excursion, share that leaves."""
+"""Sensors that fail, alone and in pairs, from a random instant: worst excursion, share that leaves.
 
+python -m docs.studies.rare.sensors    # writes sensors.csv and the table of README.md
+"""
+
+import sys
 from collections import deque
+from collections.abc import Sequence
 from itertools import combinations, product
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -9,13 +15,24 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from controllers.base import Controller
+from controllers.policy import load_policy
+from controllers.tuned import tuned
+from docs.studies.common import PAGE, fill, study_options, study_parser, table
+from epv_env.common.command_line import fail_clearly
 from epv_env.observation import HISTORY, LAYOUT, P2_LAGS, P3_LAGS, decode, encode
 from epv_env.plant.channels import CURRENT, P1, P2, P3
 from epv_env.result import DEVIATION
 from epv_env.reward import BAND_BAR
 from training.deploy.compiled import readings_of
 from training.evaluation.rollout import begin_episodes, make_env
+from training.evaluation.seeds import RANGE, STATEMENT_SEED
 
+FOLDER = Path(__file__).parent
+EPISODES = 12
+"""Of each fault alone; a quarter of it of each pair."""
+FIRST_SEED = STATEMENT_SEED + RANGE
+BEHIND = ("adaptive pulse", "extrapolating hysteresis")
+"""Controllers whose sensors fail beside the policy's."""
 CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT}
 FAULTS = ("stuck", "zero", "saturated", "wild", "delayed")
 """At its value; 0; at the sensor's end; uniform in its range in every period; late by DELAY periods."""
@@ -91,3 +108,28 @@ def fault_table(controllers: dict[str, Controller], episodes: int, first_seed: i
     groups: Any = pd.concat(rows).groupby(["fault", "controller"], sort=False)["worst_bar"]
     shares = groups.agg(lambda worst: 100 * np.mean(worst > BAND_BAR))
     return pd.DataFrame({"left_percent": shares, "worst_bar": groups.max()}).reset_index()
+
+
+def page_table(found: pd.DataFrame) -> str:
+    """Faults of one sensor where some controller left: share that leaves, and worst excursion."""
+    worst = found["worst_bar"].map("{:.2f}".format).replace("inf", "empties")
+    text = found["left_percent"].map("{:.0f}%, ".format) + worst
+    found = found[found.groupby("fault")["left_percent"].transform("max") > 0]
+    wide = found.assign(text=text).pivot(index="fault", columns="controller", values="text")
+    single = [f"{channel} {fault}" for ((channel, fault),) in SINGLE]
+    rows = wide.loc[[name for name in single if name in wide.index]].reset_index()
+    return table(list(rows.columns), rows.to_numpy().tolist())
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the episodes; returns the exit status."""
+    options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
+    controllers: dict[str, Any] = {"PPO": load_policy(), **{name: tuned(name) for name in BEHIND}}
+    found = fault_table(controllers, 1 if options.quick else EPISODES, FIRST_SEED)
+    found.to_csv(options.out / "sensors.csv", index=False, float_format="%.3g")
+    fill(options.out / PAGE, {"sensors": page_table(found)})
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(fail_clearly(main))

@@ -1,4 +1,4 @@
-"""Train, deploy on a virtual bench, diagnose, retrain in several ways, deploy again.
+"""The loop of `epv sim-to-real` on nine valves of another bench, and two rivals of the diagnosis.
 
     python -m docs.studies.sim_to_real.study --seeds 3
 
@@ -22,28 +22,32 @@ from docs.studies.blind.bench import NO_OFFSETS, SUITE, run_programme
 from docs.studies.blind.truth import draw_unit
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.files import Journal, write_text
+from epv_env.common.files import write_text
 from epv_env.common.options import COUNT
 from epv_env.episode import WORN
 from epv_env.plant.parameters import Parameters
-from epv_env.plant.plantfile import Plant, load_plant
+from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from epv_env.task import LimitingTask
 from identification.bench.session import measured_campaign
 from identification.gap.report.gap_json import GAP
 from identification.recordings.campaign_files import FILE_NAME, write_campaign
-from identification.valve_gap.diagnose import PLANT, diagnose_campaign
+from identification.valve_gap.diagnose import diagnose_campaign
 from training.commands.sim_to_real import (
-    SCENARIO,
-    alternatives,
+    AFTER,
+    BEFORE,
+    CAMPAIGN,
+    DIAGNOSIS,
+    MEASURED,
+    WITHHELD,
+    Options,
+    deployed,
     diagnosis_text,
+    loop,
     share_picture,
-    trained,
 )
-from training.evaluation.metrics import violation_interval
+from training.evaluation.metrics import EpisodeMetrics, violation_interval
 from training.evaluation.plots import COLOURS, save_figure
-from training.evaluation.rollout import run_episodes
-from training.evaluation.seeds import EVALUATION_SEED
 from training.evaluation.statistics import paired_difference
 
 FOLDER = Path(__file__).parent
@@ -77,14 +81,16 @@ CASES = (
 """Of the catalogue's effects only friction, lag and bias of p2, and the seat's leak make a policy of the
 nominal plant leave the band at sizes within the catalogue's ranges; every case holds one of them."""
 
-ARMS = {
-    "nominal plant": ("o", "white", 7), "best answer": ("D", COLOURS[1], 10),
-    "diagnosis": ("o", COLOURS[0], 7), "whole catalogue": ("s", "0.6", 7), "truth": ("|", "black", 16),
+EVERYTHING, TRUTH = "whole catalogue", "truth"
+"""Stages beside those of the loop."""
+ARMS = {BEFORE: "nominal plant", AFTER: "diagnosis", EVERYTHING: EVERYTHING, TRUTH: TRUTH}
+"""What the policy of each stage was trained on."""
+MARKS = {
+    "nominal plant": ("o", "white", 7), "diagnosis": ("o", COLOURS[0], 7),
+    EVERYTHING: ("s", "0.6", 7), TRUTH: ("|", "black", 16),
 }  # fmt: skip
-"""What a policy was trained on, with its mark in the picture; larger where others may cover it."""
-BEFORE, SINGLE, DISTRIBUTION, EVERYTHING, TRUTH = ARMS
+"""In the picture; larger where others may cover it."""
 
-VALIDATION_EPISODES = 256
 RANDOM_PLANTS = 4096
 """Plants of the whole catalogue that a training draws from."""
 SEED = 7
@@ -134,30 +140,43 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = study_options(parser, arguments)
     if options.quick:
         vars(options).update(QUICK)
-    names = ("timesteps", "episodes", "duration")
-    subject = {"seed": SEED, **{name: getattr(options, name) for name in names}}
-    journal = Journal(options.work / "deployments.jsonl", subject)
     cases = CASES[:1] if options.quick else CASES
-    found = [row for case in cases for row in deployments(case, options, journal)]
+    found = [
+        {"case": case.name, "arm": arm, "episodes": episodes}
+        for case in cases
+        for seed in range(options.seeds)
+        for arm, episodes in episodes_of(case, seed, options).items()
+    ]
     report(pd.DataFrame(found), cases, options)
     return 0
 
 
-def deployments(case: Case, options: Any, journal: Journal) -> list[dict[str, Any]]:
-    """A row for each arm and training seed: figures on the case's own valve, by episode."""
-    folder = options.work / case.name
+def folder_of(case: Case, seed: int, options: Any) -> Path:
+    """Of the loop on a case's valve with a training seed."""
+    return options.work / f"{case.name}, seed {seed}"
+
+
+def episodes_of(case: Case, seed: int, options: Any) -> dict[str, EpisodeMetrics]:
+    """Episodes on a case's valve, by arm."""
+    own = Options(
+        out=folder_of(case, seed, options), seed=seed, timesteps=options.timesteps,
+        episodes=options.episodes, duration=options.duration, controllers=(),
+    )  # fmt: skip
     true = true_valve(case)
-    corrected = diagnosed(case, true, folder)
-    rows = []
-    for seed in range(options.seeds):
-        for arm in ARMS:
-            name = f"{case.name}: {arm}, seed {seed}"
-            if name not in journal:
-                print(f"[{name}]", file=sys.stderr)
-                policy = policy_of(arm, folder, corrected, true, seed, options)
-                journal.add(name, measured(policy, case, true, options))
-            rows.append({"case": case.name, "arm": arm, "seed": seed, **journal[name]})
-    return rows
+    record(case, true, own.out)
+
+    def mounted(policy: Controller) -> Controller:
+        return UnevenLag(policy, case.unevenness) if case.unevenness else policy
+
+    results = loop(own, mounted)
+    results |= deployed(EVERYTHING, load_plant(None), whole_catalogue(), own, mounted)
+    results |= deployed(TRUTH, true, "exact", own, mounted)
+    itself = {
+        scenario: episodes
+        for (plants, scenario, _), episodes in results.items()
+        if plants == "calibrated"
+    }
+    return {arm: itself[f"{stage}, {MEASURED}"] for stage, arm in ARMS.items()}
 
 
 def true_valve(case: Case) -> Plant:
@@ -167,48 +186,20 @@ def true_valve(case: Case) -> Plant:
     return Plant(parameters=parameters, region=Region(centre=parameters), name=case.name)
 
 
-def diagnosed(case: Case, true: Plant, folder: Path) -> Plant:
-    """The plant file that the diagnosis of the bench's recordings writes."""
-    campaign, out = folder / "campaign", folder / "diagnosis"
+def record(case: Case, true: Plant, folder: Path) -> None:
+    """Write the valve, its recordings, and a diagnosis by a catalogue without the case's names."""
+    save_plant(true, folder / WITHHELD)
+    campaign, diagnosis = folder / CAMPAIGN, folder / DIAGNOSIS
     if not (campaign / FILE_NAME).exists():
         rng = np.random.default_rng([SEED, 1])
         truths = [
             run_programme(true.parameters, programme, form_deviation=case.unevenness, rng=rng)
             for programme in SUITE
         ]
-        write_campaign(
-            measured_campaign(truths, true.parameters, seed=SEED, offsets=NO_OFFSETS), campaign
-        )
-    if not (out / GAP).exists():  # written last
-        diagnose_campaign(campaign, out, without=case.without)
-    return load_plant(out / PLANT)
-
-
-def policy_of(
-    arm: str, folder: Path, corrected: Plant, true: Plant, seed: int, options: Any
-) -> Controller:
-    """The policy of an arm."""
-    nominal, work = load_plant(None), options.work
-    if arm == DISTRIBUTION and is_certain(corrected):
-        arm = SINGLE  # the same plants: the same training
-    plant, parameters, where = {
-        BEFORE: (nominal, "ten_percent", work / BEFORE),
-        SINGLE: (corrected, "confidence", folder / SINGLE),
-        DISTRIBUTION: (corrected, "diagnosis", folder / DISTRIBUTION),
-        EVERYTHING: (nominal, whole_catalogue(), work / EVERYTHING),
-        TRUTH: (true, "exact", folder / TRUTH),
-    }[arm]
-    return trained(
-        where / f"seed {seed}, {options.timesteps} steps", plant, parameters,
-        seed=seed, timesteps=options.timesteps,
-        validation_episodes=VALIDATION_EPISODES, validation_duration=options.duration,
-    )  # fmt: skip
-
-
-def is_certain(plant: Plant) -> bool:
-    """Whether the diagnosis holds the best answer alone possible."""
-    possible = alternatives(plant)
-    return len(possible) == 1 and dict(possible[0].region.centre) == dict(plant.parameters)
+        recorded = measured_campaign(truths, true.parameters, seed=SEED, offsets=NO_OFFSETS)
+        write_campaign(recorded, campaign)
+    if case.without and not (diagnosis / GAP).exists():
+        diagnose_campaign(campaign, diagnosis, without=case.without)
 
 
 @cache
@@ -224,20 +215,6 @@ def whole_catalogue() -> Mixture:
     return Mixture(alternatives=tuple(drawn))
 
 
-def measured(policy: Controller, case: Case, true: Plant, options: Any) -> dict[str, list[float]]:
-    """By episode on the bench's valve: whether p2 stayed, rms error [mbar], switchings [1/s]."""
-    if case.unevenness:
-        policy = UnevenLag(policy, case.unevenness)
-    seeds = list(range(EVALUATION_SEED, EVALUATION_SEED + options.episodes))
-    own = {"plant": true, "scenario": SCENARIO}
-    metrics = run_episodes(policy, seeds=seeds, duration=options.duration, options=own)
-    return {
-        "stayed": metrics.stayed.astype(float).tolist(),
-        "rms_mbar": np.round(1e3 * metrics.rms_bar, 1).tolist(),
-        "switchings_per_s": np.round(metrics.switchings_per_s, 3).tolist(),
-    }
-
-
 def report(found: pd.DataFrame, cases: Sequence[Case], options: Any) -> None:
     """Write results.csv, the picture and the page's table and sentences."""
     results = pd.DataFrame(
@@ -246,16 +223,16 @@ def report(found: pd.DataFrame, cases: Sequence[Case], options: Any) -> None:
     write_text(options.out / "results.csv", results.drop(columns="cell").to_csv(index=False))
     shares = results.pivot(index="case", columns="arm", values="left_percent")
     shares = shares.loc[[case.name for case in cases]]
-    save_figure(share_picture(shares, ARMS, title="trained on"), options.out / "sim-to-real.png")
+    save_figure(share_picture(shares, MARKS, title="trained on"), options.out / "sim-to-real.png")
     rows = [
         [
             case.name,
-            diagnosis_text(options.work / case.name / "diagnosis"),
+            diagnosis_text(folder_of(case, 0, options) / DIAGNOSIS),
             *results["cell"][results["case"] == case.name],
         ]
         for case in cases
     ]
-    parts = {"cases": table(["withheld", "diagnosis", *ARMS], rows), "summary": summary(found, results)}
+    parts = {"cases": table(["withheld", "diagnosis", *MARKS], rows), "summary": summary(found, results)}
     fill(options.out / PAGE, parts)
 
 
@@ -265,12 +242,13 @@ def figures(name: Any, rows: pd.DataFrame) -> dict[str, Any]:
     The interval of the share is the exact one over all episodes, as wide as the training seeds at least.
     """
     stayed, rms, switchings = (
-        np.array(rows[key].tolist()) for key in ("stayed", "rms_mbar", "switchings_per_s")
+        np.array([getattr(each, key) for each in rows["episodes"]])
+        for key in ("stayed", "rms_bar", "switchings_per_s")
     )
     by_seed = 100 * (1 - stayed.mean(axis=1))
-    ends = [100 * end for end in violation_interval(stayed.ravel() > 0)]
+    ends = [100 * end for end in violation_interval(stayed.ravel())]
     left, low, high = by_seed.mean(), min(*ends, *by_seed), max(*ends, *by_seed)
-    error, often = float(np.sqrt(np.mean(rms**2))), float(switchings.mean())
+    error, often = 1e3 * float(np.sqrt(np.mean(rms**2))), float(switchings.mean())
     return {
         "case": name[0], "arm": name[1], "seeds": len(by_seed), "left_percent": left, "left_low": low,
         "left_high": high, "rms_mbar": error, "switchings_per_s": often,
@@ -281,17 +259,19 @@ def figures(name: Any, rows: pd.DataFrame) -> dict[str, Any]:
 def summary(found: pd.DataFrame, results: pd.DataFrame) -> str:
     """What each way of training gives back, and how the diagnosis compares with the whole catalogue."""
     shares = results.pivot(index="case", columns="arm", values="left_percent").mean()
-    gained = max(shares[BEFORE] - shares[TRUTH], 1e-9)
+    nominal = shares[ARMS[BEFORE]]
+    gained = max(nominal - shares[TRUTH], 1e-9)
     lines = [
         f"- Trained on the {arm}: {shares[arm]:.1f} % of the episodes leave on average. That is "
-        f"{100 * (shares[BEFORE] - shares[arm]) / gained:.0f} % of what the truth gives back."
-        for arm in (SINGLE, DISTRIBUTION, EVERYTHING)
+        f"{100 * (nominal - shares[arm]) / gained:.0f} % of what the truth gives back."
+        for arm in (ARMS[AFTER], EVERYTHING)
     ]
     stayed = {
-        name: np.concatenate(rows["stayed"].tolist()) for name, rows in found.groupby(["case", "arm"])
+        name: np.concatenate([each.stayed for each in rows["episodes"]]).astype(float)
+        for name, rows in found.groupby(["case", "arm"])
     }
     paired = [
-        paired_difference(stayed[case, DISTRIBUTION], stayed[case, EVERYTHING])
+        paired_difference(stayed[case, ARMS[AFTER]], stayed[case, EVERYTHING])
         for case in results["case"].unique()
     ]
     better, worse = sum(p.low > 0 for p in paired), sum(p.high < 0 for p in paired)

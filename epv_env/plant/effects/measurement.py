@@ -1,9 +1,11 @@
 """Effects of sensors and of the command's timing."""
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from epv_env.plant.effects.record import Constant, Effect, Size, rate
-from epv_env.plant.primitives import inlined
+from epv_env.plant.primitives import Value, inlined
 
 
 def _lag_constants(number: int) -> tuple[Constant, ...]:
@@ -101,8 +103,8 @@ CURRENT_SENSOR_GAIN = Effect(
 COMMAND_DELAY = Effect(
     name="command_delay",
     component="timing",
-    form="the coil sees U(t − t_delay)",
-    source="sampling, network and power stage",
+    form="the coil follows U after t_delay (1 − w_delay) to on (U > 1 V), t_delay (1 + w_delay) to off",
+    source="sampling, network and power stage; stages switch on and off at different speeds",
     sizes=(
         Size(
             symbol="t_delay",
@@ -112,8 +114,20 @@ COMMAND_DELAY = Effect(
             trials=(1e-3, 4e-3),
             drawn=(3e-4, 6e-3),
         ),
+        Size(
+            symbol="w_delay",
+            unit="1",
+            domain=(-1, 1),
+            meaning="share of the delay that switching off has more and switching on less",
+            spread=0.5,
+        ),
     ),
 )
+
+
+def command_delays(p: Mapping[str, Value]) -> tuple[Value, Value]:
+    """Times after which the coil follows a voltage that switches it on, and off [s]."""
+    return p["t_delay"] * (1.0 - p["w_delay"]), p["t_delay"] * (1.0 + p["w_delay"])
 
 
 @inlined

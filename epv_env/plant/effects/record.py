@@ -117,6 +117,11 @@ class Effect:
         return tuple(size.symbol for size in self.sizes)
 
     @property
+    def strengths(self) -> tuple[str, ...]:
+        """Symbols of the sizes that say how strong the effect is; those of its form may be left out."""
+        return tuple(size.symbol for size in self.sizes if size.spread is None)
+
+    @property
     def variants(self) -> dict[str, tuple[Size, ...]]:
         """Sizes that act together, by the variant's label."""
         by_symbol = {size.symbol: size for size in self.sizes}

@@ -211,18 +211,14 @@ class FittingProblem:
         self,
         plant: GreyBox,
         slopes: NuisanceSlopes | None = None,
-        *,
-        thorough: bool = False,
     ):
         """Weigh the readings of a plant.
 
         Args:
             plant: the model and its recordings.
             slopes: nuisance slopes of estimates that have none; None: nuisances have no effect.
-            thorough: whether fits go on until little is left to gain, as a small catalogue allows.
         """
         self.plant = plant
-        self.thorough = thorough
         self.fitted_runs = [r for r, run in enumerate(plant.runs) if not run.held_out]
         self.all_runs = list(range(len(plant.runs)))
         self.readings = sum(int(np.sum(plant.runs[r].trusted)) for r in self.fitted_runs)

@@ -163,8 +163,7 @@ def nuisance_slopes(
             each.tolerance_slopes.append(own[:, offsets:] * sd)
     count = len(plant.parameters)
     calibrated = [
-        None if problem.thorough else [run.slopes[:, :count] for run in runs]
-        for runs in linearise(problem, placed, problem.all_runs)
+        [run.slopes[:, :count] for run in runs] for runs in linearise(problem, placed, problem.all_runs)
     ]
     return [replace(each, calibrated=own) for each, own in zip(all_slopes, calibrated, strict=True)]
 
@@ -173,7 +172,7 @@ def fit(
     problem: FittingProblem,
     starts: Sequence[Estimate],
     rival_chi_square: float = np.inf,
-    iterations: int = 12,
+    iterations: int = 20,
 ) -> list[Estimate]:
     """Fit every start to the fitted runs, until each fit has converged or is given up.
 
@@ -182,13 +181,13 @@ def fit(
         starts: where the fits begin.
         rival_chi_square: least chi-square of earlier fits against which these compete [1].
         iterations: most of them, for computing time; a fit that needs more is weighed as it is and
-            reported as not converged. A thorough fit, of a small catalogue, has 40.
+            reported as not converged.
     """
     if not starts:
         return []
     searches = [_Search(problem, start) for start in starts]
     active = searches
-    for _ in range((40 if problem.thorough else iterations) + 1):
+    for _ in range(iterations + 1):
         linearised = linearise(problem, [search.trial for search in active], problem.fitted_runs)
         for search, runs in zip(active, linearised, strict=True):
             search.advance(runs, rival_chi_square)
@@ -243,8 +242,8 @@ class _Search:
         readings = self.problem.readings
         excess = self.best.chi_square - readings
         # A decrease of 0.3 changes no odds, and a cause that leaves much need not be fitted to the last
-        # digit; a thorough fit follows a flat valley to its end.
-        enough = max(0.3, (1e-4 if self.problem.thorough else 3e-3) * excess)
+        # digit.
+        enough = max(0.3, 1e-3 * excess)
         # A rival is far better; noise is not known to the percent.
         hopeless = 3.0 * max(rival_chi_square - readings, 0.0) + 0.05 * readings
         self.best = replace(

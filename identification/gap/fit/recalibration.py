@@ -23,22 +23,21 @@ noise is corrected [1]: less changes no judgement."""
 
 
 def recalibrate(
-    plant: GreyBox, cache: FitCache | None = None, *, thorough: bool = False, prefix: str = ""
+    plant: GreyBox, cache: FitCache | None = None, prefix: str = ""
 ) -> tuple[FittingProblem, Estimate]:
     """The nominal model with its calibrated parameters refitted, and the problem with its nuisances.
 
     Args:
         plant: the model and its recordings.
         cache: runs the fits; None keeps nothing.
-        thorough: whether fits go on until little is left to gain, as a small catalogue allows.
         prefix: of the names of both fits in the journal.
     """
     cache = cache or FitCache(plant)
-    rough = FittingProblem(plant, thorough=thorough)
+    rough = FittingProblem(plant)
     start = rough.start(Hypothesis(causes=()), {})
     calibrated = cache(f"{prefix}calibration", lambda: fit(rough, [start]))[0]
     slopes = nuisance_slopes(rough, [calibrated], [np.zeros(len(plant.tolerances))])[0]
-    problem = FittingProblem(plant, slopes, thorough=thorough)
+    problem = FittingProblem(plant, slopes)
     fits = cache(
         f"{prefix}recalibration", lambda: fit(problem, [restarted(calibrated)]), problem.slopes_of
     )

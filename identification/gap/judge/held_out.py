@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from identification.block_bootstrap import Interval, block_starts
-from identification.gap.fit.evidence import percentage_errors, predict
+from identification.gap.fit.evidence import Prediction, percentage_errors, predict
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gaps import FLOOR, Gap, GapDraws, block_samples
 from identification.gap.judge.black_box import predict_residuals
@@ -65,6 +65,11 @@ class DiscrepancyReduction:
     """By channel: noise deviation of the gaps relative to `Channel.noise` [1]."""
 
     @property
+    def closed_by_first(self) -> Interval:
+        """Share that the best cause closes [1]; nothing where there is none."""
+        return next(iter(self.shares_closed.values()), Interval(value=0.0, low=0.0, high=0.0))
+
+    @property
     def left(self) -> Gap:
         """Gap of the best cause, of the recalibrated model where there is none."""
         return self.gaps[next(iter(self.shares_closed), RECALIBRATED)]
@@ -94,8 +99,7 @@ def measure_discrepancy_reduction(
     scale = time_scale(plant)
     boxes = {}
     for label in {RECALIBRATED, best}:
-        box = predict_residuals(plant, predictions[label], seed, scale)
-        before, after = _held_out_squares(plant, predictions[label].residuals, box)
+        box, before, after = _foreseen(plant, predictions[label], seed)
         # A box that makes the held-out residuals larger predicts nothing.
         boxes[label] = box if after.sum() < before.sum() else [np.zeros_like(block) for block in box]
     residuals = {label: model.residuals for label, model in predictions.items()}
@@ -130,10 +134,22 @@ def measure_discrepancy_reduction(
 
 def predictable_shares(problem: FittingProblem, estimate: Estimate) -> list[float]:
     """Share of a model's held-out squares that a black box foresees, by channel [1]."""
-    plant, model = problem.plant, predict(problem, estimate)
-    box = predict_residuals(plant, model, 0, time_scale(plant))
-    before, after = _held_out_squares(plant, model.residuals, box)
+    _, before, after = _foreseen(problem.plant, predict(problem, estimate), seed=0)
     return list(1.0 - after / np.maximum(before, np.finfo(float).tiny))
+
+
+def is_predictable(problem: FittingProblem, estimate: Estimate, seed: int = 0) -> bool:
+    """Whether a black box foresees, beyond chance, what a model leaves of held-out runs."""
+    plant, model = problem.plant, predict(problem, estimate)
+    box, before, after = _foreseen(plant, model, seed)
+    chance = p_value(plant, model.residuals, box, seed, time_scale(plant))
+    return bool(after.sum() < before.sum() and chance < SIGNIFICANCE)
+
+
+def _foreseen(plant: GreyBox, model: Prediction, seed: int) -> tuple[list[NDArray], NDArray, NDArray]:
+    """What a black box foresees of a model's residuals, and `_held_out_squares` without and with it."""
+    box = predict_residuals(plant, model, seed, time_scale(plant))
+    return box, *_held_out_squares(plant, model.residuals, box)
 
 
 def _held_out_squares(

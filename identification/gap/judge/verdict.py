@@ -14,15 +14,18 @@ NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
 PARTIAL, UNKNOWN = "partial", "unknown"
 """Verdicts as gap.json has them."""
 
-KNOWN_GAP = 1.15
+NAMING = (KNOWN, AMBIGUOUS, PARTIAL)
+"""Verdicts that name a cause."""
+
+SURE = 0.9
+"""Probability from which a name is sure; share of all causes that the ambiguity set holds [1]."""
+
+EXPLAINED_GAP = 1.15
 """Gap on held-out recordings up to which a cause explains all of it [noise deviations]: a third of the
 noise's variance."""
 
-FAR_ABOVE_NOISE = 1.5
-"""Gap that no word may call small [noise deviations]: twice the noise's variance."""
-
-AMBIGUITY_SHARE = 0.9
-"""Share of the probability of all causes that the ambiguity set holds."""
+MOST = 0.5
+"""Share of the gap that a named cause closes at least [1]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -68,8 +71,6 @@ class Conclusion:
     ambiguity_set: list[RankedCause]
     """The fewest causes that hold the required share of the probability of all causes; empty where no
     cause is named."""
-    held: tuple[str, ...]
-    """Effects that are surely part of the gap, by falling probability."""
     component_probabilities: dict[str, float]
     """Probability that a component is at fault, by component; a set may have several components."""
 
@@ -77,29 +78,35 @@ class Conclusion:
 def conclude(
     ranking: Ranking, localisation: Localisation, reduction: DiscrepancyReduction
 ) -> Conclusion:
-    """The verdict on the probabilities and on what held-out recordings show.
-
-    Where held-out residuals can be predicted, neither is there no gap nor is its cause fully known.
-    """
+    """The verdict on the probabilities and on what held-out recordings show."""
     causes = causes_by_name(ranking)
-    verdict = _verdict(ranking, reduction)
-    named = verdict in (KNOWN, PARTIAL)
-    ambiguity_set = smallest_set(causes, AMBIGUITY_SHARE) if named else []
-    if verdict == KNOWN and len(ambiguity_set) > 1:
-        verdict = AMBIGUOUS
+    rivals = smallest_set(causes, SURE)
+    verdict = _verdict(ranking, rivals, reduction)
     return Conclusion(
         verdict=verdict,
         causes=causes,
-        ambiguity_set=ambiguity_set,
-        held=_held(ranking) if named else (),
+        ambiguity_set=rivals if verdict in NAMING else [],
         component_probabilities=component_probabilities(ranking, localisation),
     )
 
 
-def _held(ranking: Ranking) -> tuple[str, ...]:
-    """Effects whose inclusion is sure, nine tenths of what is named (contract: gap.json)."""
+def _verdict(ranking: Ranking, rivals: Sequence[RankedCause], reduction: DiscrepancyReduction) -> str:
+    """The likeliest of no cause, an unknown one and the named ones; then how sure and how complete.
+
+    rivals: the fewest causes that hold the share SURE of the probability of all, the first one first.
+    """
     named = sum(ranking.probabilities)
-    return tuple(name for name, share in ranking.inclusion.items() if share >= 0.9 * named)
+    if ranking.no_cause > max(named, ranking.unknown):
+        return UNKNOWN if reduction.recalibration_leaves.still_predictable else NO_GAP
+    if ranking.unknown > named or reduction.closed_by_first.high < MOST:
+        return UNKNOWN
+    first = rivals[0].probability
+    explained = (
+        reduction.left.overall.value <= EXPLAINED_GAP and not reduction.unexplained.still_predictable
+    )
+    if len(rivals) == 1:
+        return KNOWN if explained and first >= SURE else PARTIAL
+    return AMBIGUOUS if explained or first < 0.5 else PARTIAL
 
 
 def causes_by_name(ranking: Ranking) -> list[RankedCause]:
@@ -147,14 +154,3 @@ def component_probabilities(ranking: Ranking, localisation: Localisation) -> dic
     for component, share in shares.items() if whole > 0 else ():
         total[component] = total.get(component, 0.0) + ranking.unknown * (share / whole)
     return dict(sorted(total.items(), key=lambda pair: -pair[1]))
-
-
-def _verdict(ranking: Ranking, reduction: DiscrepancyReduction) -> str:
-    """NO_GAP, UNKNOWN, PARTIAL or KNOWN."""
-    named = sum(ranking.probabilities)
-    if max(ranking.no_cause, ranking.unknown) > named:
-        something = ranking.unknown > ranking.no_cause
-        return UNKNOWN if something or reduction.recalibration_leaves.still_predictable else NO_GAP
-    if reduction.left.overall.value <= KNOWN_GAP and not reduction.unexplained.still_predictable:
-        return KNOWN
-    return PARTIAL if _held(ranking) else UNKNOWN

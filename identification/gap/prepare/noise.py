@@ -29,6 +29,9 @@ SEEN = 3.0
 RAW_TOLERANCE = 1.05
 """Noise that a residual shows over that of the raw readings [1], up to which both agree."""
 
+CANCELLED = 0.01
+"""Share of the mean square below which the lags hold no white part but rounding [1]: neighbours do."""
+
 LEAST = 1e-4
 """Least floor [1], for recordings without noise: a hundredth of the noise that is stated."""
 
@@ -108,7 +111,10 @@ def _channel_noise(series: Sequence[NDArray], duration: float, raw: float) -> Ch
     covariance = autocovariance(readings)
     mean_square, correlated = float(covariance[0]), _correlated(covariance)
     coloured = covariance[1] > SEEN * mean_square / np.sqrt(count)
+    neighbours = float(np.nan_to_num(white_noise(readings)) ** 2)
     white = white_variance(covariance) if coloured else mean_square
+    if neighbours < CANCELLED * mean_square:
+        white = max(white, neighbours)
     beside = max(mean_square - white, 0.0)
     period = duration / count  # readings may be sparser than samples
     return ChannelNoise(

@@ -1,6 +1,6 @@
 """The files of a diagnosis for programs: gap.json and, where one was found, the missing term.
 
-Format epv-gap/3, described in docs/reference/gap-json.md.
+Format epv-gap/4, described in docs/reference/gap-json.md.
 """
 
 import re
@@ -20,12 +20,12 @@ from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.gaps import FLOOR
 from identification.gap.fit.laws import in_words
 from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
-from identification.gap.judge.verdict import RankedCause, Ranking
+from identification.gap.judge.verdict import RankedCause
 from identification.gap.locate.localisation import Localisation, MissingTerm
 from identification.gap.search.posterior import variance_inflation
 
 GAP, TERM = "gap.json", "missing_term.json"
-FORMAT = "epv-gap/3"
+FORMAT = "epv-gap/4"
 
 LISTED_CAUSES = 10
 """Most causes in gap.json; the others are the least probable."""
@@ -65,7 +65,6 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
     models = {name: reduction.gaps[label] for name, label in labels.items()}
     overall = {name: gap.overall for name, gap in models.items()}
     overall["black_box_floor"] = reduction.black_box.overall
-    inclusion = _noticeable(ranking.inclusion)
     return {
         "format": FORMAT,
         "verdict": conclusion.verdict,
@@ -98,20 +97,10 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
                 name: (gap.percent or {}).get("overall") for name, gap in models.items()
             },
         },
-        "unexplained": {
-            "fraction": unexplained.fraction,
+        "left": {
+            **_fraction(share_left(diagnosis)),
             "still_predictable": unexplained.still_predictable,
             "p_value": unexplained.p_value,
-            "location": _place(diagnosis.remaining),
-        },
-        "inclusion": inclusion,
-        "levels": {
-            "component": conclusion.component_probabilities,
-            "mechanism": inclusion,
-            "form": _noticeable(_forms(ranking)),
-        },
-        "remainder": {
-            **_fraction(share_left(diagnosis)),
             "component": dict(
                 sorted(left.component_probabilities.items(), key=lambda pair: -pair[1]) if left else ()
             ),
@@ -126,15 +115,19 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
         },
         "screened": [asdict(finding) for finding in diagnosis.screened],
         "next_experiment": next_experiment,
-        "probability": {"no_cause": ranking.no_cause, "unknown": ranking.unknown},
-        "twins": {
+        "probability": {
+            "no_cause": ranking.no_cause,
+            "unknown": ranking.unknown,
+            "effects": _noticeable(ranking.inclusion),
+        },
+        "indistinguishable": {
             label: list(twins)
             for cause in diagnosis.judged
             for label in cause.hypothesis.labels
             if (twins := separability.twins(label))
         },
-        "absorbed": list(separability.absorbed),
-        "as_consumption": list(diagnosis.as_consumption),
+        "not_identifiable": list(separability.absorbed),
+        "confounded_with_consumption": list(diagnosis.as_consumption),
         "onset": asdict(onset) if onset else None,
         "warnings": diagnosis.warnings,
     }
@@ -167,28 +160,12 @@ def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
     return entry
 
 
-def _place(left: Localisation | None) -> str | None:
-    """Component and equation where something is most likely missing; None where nothing is located."""
-    if not left or not left.forcings:
-        return None
-    return f"{left.likeliest.equation.component}: {left.likeliest.equation.name}"
-
-
 def _fraction(share: Interval) -> dict[str, float]:
     return {"fraction": share.value, "low": share.low, "high": share.high}
 
 
 def _noticeable(probabilities: Mapping[str, float]) -> dict[str, float]:
     return {name: min(float(p), 1.0) for name, p in probabilities.items() if p >= LISTED_INCLUSION}
-
-
-def _forms(ranking: Ranking) -> dict[str, float]:
-    """Probability that each form of an effect is part of the gap."""
-    total = dict[str, float]()
-    for hypothesis, probability in zip(ranking.hypotheses, ranking.probabilities, strict=True):
-        for label in hypothesis.labels:
-            total[label] = total.get(label, 0.0) + probability
-    return total
 
 
 def discrepancy(diagnosis: Diagnosis) -> dict[str, dict[str, float]]:

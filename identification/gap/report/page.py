@@ -277,7 +277,7 @@ def gap_table(diagnosis: Diagnosis) -> Table:
 
 def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
     """Calibrated parameters of the model to use, with intervals; status: of the verdict."""
-    model = diagnosis.kept
+    model = diagnosis.model
     intervals = parameter_intervals(diagnosis, model)
     rows, statuses = [], []
     for parameter in diagnosis.ranking.problem.plant.parameters:
@@ -293,7 +293,7 @@ def calibrated_values(diagnosis: Diagnosis, status: str) -> Table:
                 ANSWERS[statuses[-1]] + ("" if statuses[-1] == "good" else f": {reason}"),
             ]
         )
-    name = f"with {model.title}" if model.labels else f"{diagnosis.kept_label}, without a cause"
+    name = f"with {model.title}" if model.labels else f"{diagnosis.model_label}, without a cause"
     return Table(
         columns=["Parameter", "nominal", f"fitted ({LEVEL_TEXT} interval)", "trust it"],
         rows=rows,

@@ -11,7 +11,7 @@ from identification.gap.diagnosis import Diagnosis
 from identification.gap.fit.gaps import FLOOR
 from identification.gap.fit.laws import in_words as laws_in_words
 from identification.gap.judge.held_out import LEAST_GAP_CLOSED, RECALIBRATED
-from identification.gap.judge.verdict import FAR_ABOVE_NOISE, NO_GAP, UNKNOWN, RankedCause
+from identification.gap.judge.verdict import NO_GAP, UNKNOWN, RankedCause
 from identification.gap.locate.localisation import Localisation
 from identification.gap.plant import FreeParameter, StateEquation
 from identification.gap.report.gap_json import discrepancy, remainder, share_left
@@ -20,6 +20,9 @@ from identification.report.page import templates
 MENTIONED_DISCREPANCY = 0.3
 """Standard deviation of a disturbance [noise deviations] from which the verdict mentions it: less adds
 under 5 % to the readings' scatter."""
+
+FAR_ABOVE_NOISE = 1.5
+"""Gap that no word may call small [noise deviations]: twice the noise's variance."""
 
 BOUND_TOLERANCE = 1e-6
 """Share of a range [1] within which a parameter is reported as lying at the end of its range."""
@@ -95,7 +98,6 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "common": common,
         "rests": rests,
         "all_named": all(rests),
-        "helpful": any(diagnosis.surely_helps(cause) for cause in rivals),
         "possible": max(possible.items(), key=lambda pair: pair[1]),
         "disturbances": disturbances(diagnosis) if conclusion.verdict == NO_GAP else [],
         "remainder": remainder(diagnosis),
@@ -151,7 +153,7 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
     """Fitted parameters at an end of their physical range, of the model to use and of named causes."""
     problem = diagnosis.ranking.problem
     named = {cause.hypothesis.title: cause.hypothesis for cause in diagnosis.conclusion.ambiguity_set}
-    models = {diagnosis.kept.title or diagnosis.kept_label: diagnosis.kept} | named
+    models = {diagnosis.model.title or diagnosis.model_label: diagnosis.model} | named
     estimates = {name: hypothesis.estimate for name, hypothesis in models.items()}
     ends = [
         f"{name}: {p.title} is at an end of its physical range ({quantity(value, p.unit)})"

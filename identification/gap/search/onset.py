@@ -132,7 +132,7 @@ def likeliest_span(
     kinds = ["whole" if s == (0, count) else "late" if s[1] == count else "mended" for s in spans]
     prior = np.array([np.log(KINDS[kind] / kinds.count(kind)) for kind in kinds])
     misfits = (squares / np.min(squares) - 1.0) * readings / 2.0
-    chances = softmax(log_likelihoods(misfits, readings) + prior)
+    chances = softmax(log_likelihoods(misfits, tolerated_misfit(readings)) + prior)
     # A drive without fitted openings makes ties: the shortest span has what shows the cause.
     lengths = [end - first for first, end in spans]
     best = min(range(len(spans)), key=lambda k: (-round(float(chances[k]), 6), lengths[k]))

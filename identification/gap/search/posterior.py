@@ -18,16 +18,22 @@ from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.prepare.noise import ChannelNoise, residual_noise
 
-POWER = 10.0
-"""How many powers of 1 + M/T the likelihood falls by [1]: a cause that leaves 2 T is 60 times less
+POWER = 7.0
+"""How many powers of 1 + M/T the likelihood falls by [1]: a cause that leaves 3 T is 130 times less
 probable than one that leaves T."""
 
 NO_CAUSE = 0.5
 """Probability before the data of no cause: most valves have no fault or one."""
 
-UNKNOWN_SHARE = 3e-3
-"""Share of the recalibrated model's misfit that an unknown cause is taken to leave [1], beside the
-tolerated one: 5 % in amplitude, which a wrong cause rarely reaches."""
+UNKNOWN = 0.2
+"""Probability of an unknown cause relative to the best catalogued one, where both leave as much [1]."""
+
+UNKNOWN_SHARE, LAW_SHARE = 0.1, 0.2
+"""Share of the recalibrated model's misfit that the nearest catalogued cause leaves of an unknown one
+[1]: a third in amplitude. And how much less it leaves with each open law: laws fit nearly anything."""
+
+EXPECTED_PENALTY = 1.5
+"""Half the squared deviation of a law from the assumed one that is usual, of three components [nats]."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,22 +54,33 @@ class Posterior:
     """The hypothesis, or the model without a cause, that leaves the least; it shows the noise."""
     noise: list[ChannelNoise]
     """Noise of each channel under it."""
+    much_is_left: bool
+    """Whether that hypothesis leaves more than what no model is free of."""
 
 
 def posterior(
-    problem: FittingProblem, recalibrated: EvaluatedHypothesis, hypotheses: Sequence[EvaluatedHypothesis]
+    problem: FittingProblem,
+    recalibrated: EvaluatedHypothesis,
+    hypotheses: Sequence[EvaluatedHypothesis],
+    predictable: bool = True,
 ) -> Posterior:
-    """Probabilities of hypotheses with causes, of no cause and of an unknown one."""
+    """Probabilities of hypotheses with causes, of no cause and of an unknown one.
+
+    predictable: whether the inputs foretell what the recalibrated model leaves; if not, no model is free
+    of what the best hypothesis leaves.
+    """
     every = [recalibrated, *hypotheses]
     best = min(every, key=lambda each: float(np.sum(np.log(np.maximum(each.squares, 1e-300)))))
     noise = residual_noise(problem.plant, best.residuals)
     misfits = np.array([misfit_beyond_noise(each, noise) for each in every])
-    misfits = misfits - min(float(np.min(misfits)), 0.0)
-    readings = sum(own.readings for own in noise)
-    left = np.append(misfits, tolerated_misfit(readings) + UNKNOWN_SHARE * misfits[0])
-    scores = log_likelihoods(left, readings) + log_priors(problem, hypotheses)
+    misfits -= min(float(np.min(misfits)), 0.0)
+    tolerated = tolerated_misfit(sum(own.readings for own in noise))
+    much_is_left = bool(np.min(misfits) > tolerated)
+    tolerated += 0.0 if predictable else float(np.min(misfits))
+    scores = log_likelihoods(misfits, tolerated) + log_priors(problem, hypotheses)
+    scores = np.append(scores, log_score_of_unknown(scores, misfits, hypotheses, tolerated))
     weights = softmax(scores)
-    order = np.lexsort((misfits[1:], -weights[1:-1]))
+    order = np.argsort(-scores[1:-1], kind="stable")
     return Posterior(
         hypotheses=[hypotheses[i] for i in order],
         probabilities=weights[1:-1][order].tolist(),
@@ -72,6 +89,7 @@ def posterior(
         misfits=misfits[1:][order].tolist(),
         best=best,
         noise=noise,
+        much_is_left=much_is_left,
     )
 
 
@@ -84,34 +102,60 @@ def tolerated_misfit(readings: int) -> float:
     return 15.0 + 2e-3 * readings
 
 
-def log_likelihoods(misfits: NDArray, readings: int) -> NDArray:
-    """Of misfits (n,) [nats] where the variance of the model's discrepancy is unknown, (n,)."""
-    return -POWER * np.log1p(misfits / tolerated_misfit(readings))
+def log_likelihoods(misfits: NDArray, tolerated: float) -> NDArray:
+    """Of misfits (n,) or () [nats] where the variance of the model's discrepancy is unknown, (n,)."""
+    return -POWER * np.log1p(misfits / tolerated)
 
 
 def log_priors(problem: FittingProblem, hypotheses: Sequence[EvaluatedHypothesis]) -> NDArray:
-    """Log probability before the data of no cause, of hypotheses and of an unknown cause, (n + 2,).
+    """Log probability before the data of no cause and of hypotheses, (1 + n,).
 
     All sets of as many causes share the probability of their number, and an open law that of all states
-    that it may follow. A size at an end of its range costs 1 nat. An unknown cause is as probable as two
-    causes.
+    that it may follow. A size at an end of its range costs 1 nat.
     """
+    return np.array([np.log(NO_CAUSE), *(_log_prior(problem, each) for each in hypotheses)])
+
+
+def _log_prior(problem: FittingProblem, each: EvaluatedHypothesis) -> float:
+    hypothesis = each.estimate.hypothesis
     arguments = max(len(getattr(problem.plant, "law_arguments", ())), 1)
-    count = len({cause.name for cause in problem.plant.causes})
-    chosen = np.array([*(len(each.labels) for each in hypotheses), min(2, count)])
+    count, chosen = len({cause.name for cause in problem.plant.causes}), len(each.labels)
     sets = gammaln(count + 1) - gammaln(chosen + 1) - gammaln(count - chosen + 1)
     # One cause is taken to act in three of ten plants; each further one is ten times rarer.
-    logs = np.log(0.3) + (chosen - 1) * np.log(0.1) - sets
-    own = [sum(np.log(c.prior) for c in each.estimate.hypothesis.causes) for each in hypotheses]
-    laws = [
-        each.law_penalty + len(each.estimate.hypothesis.laws) * np.log(arguments) + each.unusual
-        for each in hypotheses
-    ]
-    sizes = [sum(len(c.sizes) for c in each.estimate.hypothesis.causes) for each in hypotheses]
-    # Sizes that are fitted fit noise as well (Schwarz 1978); an unknown cause has two.
-    fitted = 0.5 * np.log(max(problem.readings, 1)) * np.array([*sizes, 2.0])
-    logs = logs - fitted
-    return np.array([np.log(NO_CAUSE), *(logs[:-1] + own - np.array(laws)), logs[-1]])
+    number = np.log(0.3) + (chosen - 1) * np.log(0.1) - sets
+    variants = sum(np.log(cause.prior) for cause in hypothesis.causes)
+    laws = each.law_penalty + len(hypothesis.laws) * np.log(arguments)
+    # Sizes that are fitted fit noise as well (Schwarz 1978).
+    sizes = 0.5 * np.log(max(problem.readings, 1)) * sum(len(c.sizes) for c in hypothesis.causes)
+    return float(number + variants - laws - sizes - each.unusual)
+
+
+def log_score_of_unknown(
+    scores: NDArray, misfits: NDArray, hypotheses: Sequence[EvaluatedHypothesis], tolerated: float
+) -> float:
+    """That of an unknown cause: as complex as the best set of causes, with usual laws and sizes.
+
+    It leaves as much as the nearest wrong set of causes usually does: less with each open law. The set's
+    most credible variant counts, whatever laws improve it further.
+
+    scores, misfits: of no cause, then of the hypotheses, (1 + n,).
+    """
+    if not hypotheses:
+        return -np.inf
+    best = int(np.argmax(scores[1:]))
+
+    def log_odds(each: EvaluatedHypothesis, misfit: float) -> float:
+        laws = len(each.estimate.hypothesis.laws)
+        wild = max(each.law_penalty - EXPECTED_PENALTY * laws, 0.0) + each.unusual
+        left = np.array([UNKNOWN_SHARE * LAW_SHARE**laws * misfits[0], misfit])
+        of_unknown, own = log_likelihoods(left, tolerated)
+        return float(np.log(UNKNOWN) + wild + of_unknown - own)
+
+    return float(scores[1 + best]) + min(
+        log_odds(each, misfit)
+        for each, misfit in zip(hypotheses, misfits[1:], strict=True)
+        if set(each.labels) == set(hypotheses[best].labels)
+    )
 
 
 def misfit_beyond_noise(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]) -> float:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from identification.gap.fit.variable_projection import (
     ChangedRuns,
     LinearisedRun,
     NormalEquations,
+    bounded_minimiser,
     normal_equations,
 )
 from identification.gap.plant import Cause
@@ -66,6 +68,13 @@ class CauseSignature:
         ends = np.array([(p.low, p.high) for p in sizes]) - nominal[:, None]
         shares = ends / (np.array([trial[p.symbol] for p in sizes]) - nominal)[:, None]
         return float(np.max(np.min(shares, axis=1))), float(np.min(np.max(shares, axis=1)))
+
+    def values_at(self, share: float) -> dict[str, float]:
+        """The cause's values by symbol [SI] where it changes the outputs by a share of the trial [1]."""
+        return {
+            p.symbol: float(p.nominal + share * (trial - p.nominal))
+            for p, trial in zip(self.cause.parameters, self.trial, strict=True)
+        }
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -138,7 +147,6 @@ def screen_causes(
     base: Estimate,
     base_runs: Sequence[LinearisedRun],
     signatures: Sequence[CauseSignature],
-    every_start: bool = False,
 ) -> list[Start]:
     """The best start of every cause beside the base estimate, the most promising cause first.
 
@@ -150,7 +158,6 @@ def screen_causes(
         base: the estimate to which the causes are added.
         base_runs: the same linearised in the fitted runs.
         signatures: from `simulate_signatures` beside the same base.
-        every_start: return all starts of each cause, not only the best.
     """
     if not signatures:
         return []
@@ -168,8 +175,7 @@ def screen_causes(
             nearest[label] = chi_square, with_cause(problem, base, signature.cause, values)
     predicted = [estimate for _, estimate in nearest.values()]
     starts = [*tried, *simulated_starts(problem, base, base_runs, predicted)]
-    kept = starts if every_start else best_start_of_each(starts)
-    return sorted(kept, key=lambda start: start.chi_square)
+    return sorted(best_start_of_each(starts), key=lambda start: start.chi_square)
 
 
 def best_start_of_each(starts: Sequence[Start]) -> list[Start]:
@@ -219,12 +225,7 @@ def _predicted(equations: NormalEquations, signature: CauseSignature) -> tuple[f
     equations: with the signature's changes as the last slope.
     """
     share, chi_square = _bounded_last_step(equations, *signature.shares)
-    parameters = signature.cause.parameters
-    values = [
-        p.nominal + share * (trial - p.nominal)
-        for p, trial in zip(parameters, signature.trial, strict=True)
-    ]
-    return chi_square, {p.symbol: float(v) for p, v in zip(parameters, values, strict=True)}
+    return chi_square, signature.values_at(share)
 
 
 def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> tuple[float, float]:
@@ -256,6 +257,50 @@ def with_changes(run: LinearisedRun, changes: Sequence[NDArray]) -> LinearisedRu
     )
 
 
+def best_pairs(
+    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature], most: int
+) -> list[list[tuple[Cause, dict[str, float]]]]:
+    """The pairs of causes that promise most together, each cause with its values by symbol [SI].
+
+    base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
+    """
+    gram, moment = _without_base(base_runs, signatures)
+    shares = np.array([signature.shares for signature in signatures])
+    found = []
+    for pair in combinations(range(len(signatures)), 2):
+        if signatures[pair[0]].cause.name != signatures[pair[1]].cause.name:
+            own = np.array(pair)
+            part = gram[np.ix_(own, own)]
+            best = bounded_minimiser(part + 1e-9 * np.eye(2), moment[own], *shares[own].T)
+            found.append((float(best @ part @ best - 2.0 * best @ moment[own]), pair, best))
+    of_causes: dict[frozenset[str], tuple] = {}
+    for each in sorted(found, key=lambda each: each[0]):
+        of_causes.setdefault(frozenset(signatures[i].cause.label for i in each[1]), each)
+    return [
+        [
+            (signatures[i].cause, signatures[i].values_at(share))
+            for i, share in zip(pair, best, strict=True)
+        ]
+        for _, pair, best in list(of_causes.values())[:most]
+    ]
+
+
+def _without_base(
+    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
+) -> tuple[NDArray, NDArray]:
+    """Gram matrix (n, n) of n signatures and their products with the residual (n,), the base's own
+    parameters and all nuisances minimised over [1]."""
+    runs = [
+        with_changes(run, [signature.changes[r] for signature in signatures])
+        for r, run in enumerate(base_runs)
+    ]
+    equations, k = normal_equations(runs), base_runs[0].slopes.shape[1]
+    hessian, gradient = equations.hessian, equations.gradient
+    cross = hessian[:k, k:]
+    solved = np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), np.column_stack([cross, gradient[:k]]))
+    return hessian[k:, k:] - cross.T @ solved[:, :-1], gradient[k:] - cross.T @ solved[:, -1]
+
+
 def assess_separability(
     base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
 ) -> Separability:
@@ -266,13 +311,7 @@ def assess_separability(
     first: dict[str, CauseSignature] = {}
     for signature in signatures:
         first.setdefault(signature.cause.label, signature)
-    runs = [
-        with_changes(run, [signature.changes[r] for signature in first.values()])
-        for r, run in enumerate(base_runs)
-    ]
-    hessian, k = normal_equations(runs).hessian, base_runs[0].slopes.shape[1]
-    cross = hessian[:k, k:]
-    gram = hessian[k:, k:] - cross.T @ np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), cross)
+    gram, _ = _without_base(base_runs, list(first.values()))
     norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
     divisors = np.maximum(norms, np.sqrt(np.finfo(float).tiny))
     return Separability(

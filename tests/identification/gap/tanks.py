@@ -28,6 +28,15 @@ def disturbed() -> Tank:
     return tank
 
 
+def struck() -> Tank:
+    """A cause that the catalogue lacks."""
+    tank = leaking()
+    tank.causes = tuple(  # type: ignore[assignment]
+        cause for cause in tank.causes if cause.name not in ("leak", "evaporation")
+    )
+    return tank
+
+
 class Twins(Tank):
     """A leaking tank whose catalogue has the leak under two names."""
 
@@ -47,7 +56,7 @@ class Twins(Tank):
 TANKS: dict[str, Callable[[], Tank]] = {
     "known": leaking,
     "no_gap": without_gap,
-    "unknown": disturbed,
+    "unknown": struck,
     "ambiguous": Twins,
 }
 

@@ -11,7 +11,6 @@ from identification.gap.fit.gauss_newton import fit
 from identification.gap.fit.recalibration import recalibrate
 from identification.gap.judge.verdict import Ranking
 from identification.gap.prepare.prepared_plant import prepared
-from identification.gap.search import cause_search
 from identification.gap.search.cause_search import HypothesisPool, _leave_causes_out
 from tests.identification.gap.drives import Drive
 
@@ -28,17 +27,9 @@ def sizes(found: Ranking) -> dict[str, float]:
 
 
 @pytest.mark.parametrize(
-    ("truth", "largest_small"),
-    [
-        ({"limit": 0.8}, 12),
-        ({"dead_zone": 0.3, "drag": -0.2}, 12),
-        (THRESHOLDS, 12),
-        (THRESHOLDS, 0),
-        (FAINT_AMONG_FOUR, 12),
-    ],
+    "truth", [{"limit": 0.8}, {"dead_zone": 0.3, "drag": -0.2}, THRESHOLDS, FAINT_AMONG_FOUR]
 )
-def test_all_that_acts_is_found_and_nothing_else(truth, largest_small, monkeypatch):
-    monkeypatch.setattr(cause_search, "MULTI_START_CAUSES", largest_small)
+def test_all_that_acts_is_found_and_nothing_else(truth):
     found = rank_hypotheses(Drive(truth))
     assert sizes(found) == pytest.approx(truth, rel=0.1)
     assert all((found.inclusion[name] > 0.9) == (name in truth) for name in found.inclusion)
@@ -57,9 +48,8 @@ def test_a_cause_that_has_become_superfluous_is_left_out():
     assert pool.posterior().hypotheses[0].labels == ("lag",)
 
 
-def test_a_search_that_is_resumed_gives_the_undisturbed_answer(tmp_path, monkeypatch):
+def test_a_search_that_is_resumed_gives_the_undisturbed_answer(tmp_path):
     """With fits that were given up, and nuisance slopes that a journal does not keep."""
-    monkeypatch.setattr(cause_search, "MULTI_START_CAUSES", 0)
     plant = prepared(Drive(THRESHOLDS))
     cache = FitCache(plant, Journal(tmp_path / "fits.jsonl", {}))
     whole, resumed = rank_hypotheses(plant, cache), rank_hypotheses(plant, cache)

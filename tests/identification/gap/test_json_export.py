@@ -35,10 +35,10 @@ def documented() -> set[str]:
 def test_every_verdict_has_the_fields_that_the_page_describes_and_no_others(verdict):
     content = json.loads(json.dumps(as_json(diagnosed(verdict), "Wait."), allow_nan=False))
     assert set(content) == documented() - {"seconds"} | {"format"}
-    assert (content["format"], content["verdict"]) == ("epv-gap/3", verdict)
+    assert (content["format"], content["verdict"]) == ("epv-gap/4", verdict)
     assert content["next_experiment"] == "Wait."
     assert set(content["gap"]["report_metric_percent"]) == set(content["parameters"]) == MODELS
-    remainder = content["remainder"]
+    remainder = content["left"]
     assert 0 <= remainder["low"] <= remainder["fraction"] <= remainder["high"] <= 1
     assert set(content["discrepancy"]) == set(content["where"]["channel"])
     judged = content["causes"][0]
@@ -51,10 +51,11 @@ def test_probabilities_fall_and_sum_to_one(verdict):
     content = as_json(diagnosed(verdict))
     found = [cause["probability"] for cause in content["causes"]]
     assert found == sorted(found, reverse=True)
-    assert sum(found) + sum(content["probability"].values()) == pytest.approx(1.0)
+    others = content["probability"]["no_cause"] + content["probability"]["unknown"]
+    assert sum(found) + others == pytest.approx(1.0)
     named = {"known": [["leak"]], "ambiguous": [["leak"], ["seep"]]}
     assert sorted(content["ambiguity_set"]) == named.get(verdict, [])
-    assert content["twins"].get("leak", []) == (["seep"] if verdict == "ambiguous" else [])
+    assert content["indistinguishable"].get("leak", []) == (["seep"] if verdict == "ambiguous" else [])
 
 
 def test_a_known_cause_is_the_whole_ambiguity_set_and_its_size_is_that_of_the_tank():

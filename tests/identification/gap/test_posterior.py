@@ -8,10 +8,12 @@ import numpy as np
 import pytest
 
 from identification.gap.diagnosis import rank_hypotheses
+from identification.gap.fit.fitting_problem import Hypothesis
 from identification.gap.fit.laws import Law
 from identification.gap.judge.verdict import Ranking
 from identification.gap.search.posterior import (
     POWER,
+    UNKNOWN,
     UNKNOWN_SHARE,
     Posterior,
     log_priors,
@@ -38,9 +40,9 @@ def weighed(found: Ranking, change=lambda each: each) -> Posterior:
 
 
 def odds(found: Posterior) -> dict[tuple[str, ...], float]:
-    """Probability of each hypothesis relative to that of an unknown cause."""
+    """Probability of each hypothesis relative to that of no cause."""
     pairs = zip(found.hypotheses, found.probabilities, strict=True)
-    return {each.labels: probability / found.unknown for each, probability in pairs}
+    return {each.labels: probability / found.no_cause for each, probability in pairs}
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -63,25 +65,38 @@ def test_a_probability_is_a_power_of_what_is_left_times_its_prior():
     found = ranked({"coupling": 0.1})
     tolerated = tolerated_misfit(sum(own.readings for own in found.noise))
     whole = misfit_beyond_noise(found.recalibrated, found.noise)
-    priors = np.exp(log_priors(found.problem, found.hypotheses))
-    unknown = (2.0 + UNKNOWN_SHARE * whole / tolerated) ** -POWER * priors[-1]
-    for each, prior in zip(found.hypotheses, priors[1:-1], strict=True):
+    none, *priors = np.exp(log_priors(found.problem, found.hypotheses))
+    for each, prior in zip(found.hypotheses, priors, strict=True):
         left = max(misfit_beyond_noise(each, found.noise), 0.0)
-        expected = (1.0 + left / tolerated) ** -POWER * prior / unknown
+        expected = ((tolerated + left) / (tolerated + whole)) ** -POWER * prior / none
         assert odds(found)[each.labels] == pytest.approx(expected, rel=1e-6)
+
+
+def test_an_unknown_cause_is_as_complex_as_the_best_and_leaves_a_share():
+    found = ranked({"coupling": 0.1})
+    tolerated = tolerated_misfit(sum(own.readings for own in found.noise))
+    whole = misfit_beyond_noise(found.recalibrated, found.noise)
+    left = max(misfit_beyond_noise(found.hypotheses[0], found.noise), 0.0)
+    share = (tolerated + UNKNOWN_SHARE * whole) / (tolerated + left)
+    assert found.unknown / found.probabilities[0] == pytest.approx(UNKNOWN * share**-POWER, rel=1e-6)
 
 
 def test_sets_of_as_many_causes_share_a_prior_and_an_open_law_costs_its_choice():
     found = ranked({"dead_zone": 0.15, "lag": 0.03, "coupling": 0.1})
-    sets = {len(each.labels): each for each in found.hypotheses}
+    one, count = next(each for each in found.hypotheses if len(each.labels) == 1), len(RANGES)
+    causes = tuple(found.problem.plant.causes)
+    sets = {
+        number: replace(
+            one, estimate=replace(one.estimate, hypothesis=Hypothesis(causes=causes[:number]))
+        )
+        for number in (1, 2, 3)
+    }
     problem = copy(found.problem)
-    none, *own, unknown = np.exp(log_priors(problem, list(sets.values())))
-    count = len(RANGES)
+    none, *own = np.exp(log_priors(problem, list(sets.values())))
     each_size = problem.readings**-0.5
     shared = {1: 0.3 / count, 2: 0.03 / (count * (count - 1) / 2), 3: 0.003 / 20}
     shared = {number: prior * each_size**number for number, prior in shared.items()}
     assert none == pytest.approx(0.5)
-    assert unknown == pytest.approx(shared[2])
     given = dict(zip(sets, own, strict=True))
     assert {number: given[number] for number in shared} == pytest.approx(shared)
     problem.plant.law_arguments = ("u", "w")  # type: ignore[attr-defined]

@@ -8,10 +8,10 @@ import pytest
 
 from docs.examples.tank import Tank, virtual_recordings
 from identification.gap.diagnosis import Diagnosis, diagnose, rank_hypotheses
-from identification.gap.judge.verdict import KNOWN_GAP, PARTIAL, UNKNOWN, Ranking
+from identification.gap.judge.verdict import EXPLAINED_GAP, NO_GAP, PARTIAL, Ranking
 from identification.gap.report.sentences import verdict_sentence
 from tests.identification.gap.drives import Drive
-from tests.identification.gap.tanks import disturbed, leaking, without_gap
+from tests.identification.gap.tanks import disturbed, leaking, struck, without_gap
 
 
 @pytest.mark.parametrize(("name", "size"), [("leak", 4e-3), ("lag", 4.0), ("evaporation", 8e-4)])
@@ -36,10 +36,18 @@ def test_without_a_cause_recalibration_is_enough(seed):
 
 
 def test_what_the_catalogue_lacks_is_unknown():
-    """An inflow that is not what was measured: no cause of the list makes steps of its own."""
-    found = rank_hypotheses(disturbed())
+    found = rank_hypotheses(struck())
     assert found.unknown > 0.8
     assert all(probability < 0.1 for probability in found.inclusion.values())
+
+
+def test_a_disturbance_that_no_input_foretells_is_no_gap_however_large():
+    found = diagnose(disturbed())
+    assert found.conclusion.verdict == NO_GAP
+    assert found.reduction.gaps["recalibrated"].overall.value > 5.0
+    status, text = verdict_sentence(found)
+    assert status == "doubt"
+    assert text.startswith("Nothing in what recalibration leaves can be predicted from the inputs")
 
 
 def stating(tank: Tank, factor: float) -> Tank:
@@ -70,27 +78,27 @@ def beside_a_lag(coupling: float, lag: float) -> Diagnosis:
     return diagnose(Drive({"coupling": coupling, "lag": lag}, names=("coupling", "limit", "drift")))
 
 
-def test_a_true_cause_that_leaves_a_little_is_held():
+def test_a_true_cause_that_leaves_a_little_is_named_with_its_probability():
     found = beside_a_lag(*NEARLY_ALL)
     assert found.conclusion.verdict == PARTIAL
-    assert found.conclusion.held == ("coupling",)
     assert 0.9 < found.reduction.shares_closed["coupling"].value < 1.0
-    assert found.reduction.left.overall.value > KNOWN_GAP
+    assert found.reduction.left.overall.value > EXPLAINED_GAP
     text = verdict_sentence(found)[1]
-    assert text.startswith("coupling is part of the gap (")
-    assert "Add coupling." in text
+    assert text.startswith("coupling closes 9")
+    assert "that this is the cause has a probability of" in text
+    assert "Add coupling with coupling = " in text
 
 
-def test_a_true_cause_that_leaves_much_is_to_be_added_but_not_named():
-    found = beside_a_lag(*A_PART)
-    assert found.conclusion.verdict == UNKNOWN
-    assert found.conclusion.held == ()
+def test_a_true_cause_that_leaves_much_is_less_sure_and_to_be_added():
+    found, sure = beside_a_lag(*A_PART), beside_a_lag(*NEARLY_ALL)
+    assert found.best
+    assert sure.best
+    assert found.best.effects == sure.best.effects == ("coupling",)
+    assert found.best.probability < sure.best.probability
     assert 0.5 < found.reduction.shares_closed["coupling"].value < 0.9
-    assert found.advised
-    assert "coupling" in found.advised.effects
-    text = verdict_sentence(found)[1]
-    assert "all the same: it closes" in text
-    assert "do not add" not in text
+    assert found.helps
+    assert "coupling" in found.model.names
+    assert "do not add" not in verdict_sentence(found)[1]
 
 
 @pytest.mark.parametrize("sizes", [NEARLY_ALL, A_PART])

@@ -38,14 +38,14 @@ def partial() -> Diagnosis:
     """The same, with what a judge has to say of it set by hand: no test of the judge."""
     found = leaking_and_disturbed()
     first = next(c for c in found.judged if c.effects == ("leak",))
-    conclusion = replace(found.conclusion, verdict=PARTIAL, ambiguity_set=[first], held=("leak",))
+    conclusion = replace(found.conclusion, verdict=PARTIAL, ambiguity_set=[first])
     return replace(found, conclusion=conclusion, judged=[first], remaining=found.localisation)
 
 
 def unknown() -> Diagnosis:
     """The same where the leak is not believed to be the cause."""
     found = partial()
-    conclusion = replace(found.conclusion, verdict=UNKNOWN, ambiguity_set=[], held=())
+    conclusion = replace(found.conclusion, verdict=UNKNOWN, ambiguity_set=[])
     return replace(found, conclusion=conclusion)
 
 
@@ -57,34 +57,36 @@ def closing(found: Diagnosis, low: float, value: float, high: float) -> Diagnosi
     return replace(found, reduction=replace(found.reduction, shares_closed=shares, unexplained=left))
 
 
-def test_a_leak_beside_a_disturbance_is_unknown_and_to_be_added_all_the_same():
+def test_a_leak_beside_a_disturbance_is_named_and_to_be_added():
     found = leaking_and_disturbed()
-    assert found.conclusion.verdict == UNKNOWN
-    assert found.advised
-    assert "leak" in found.advised.effects
-    assert verdict_sentence(found)[0] == "bad"
-    assert "all the same: it closes" in verdict_sentence(found)[1]
+    assert found.conclusion.verdict == PARTIAL
+    assert found.helps
+    assert "leak" in found.model.names
+    assert verdict_sentence(found)[0] == "doubt"
+    assert "Add leak with" in verdict_sentence(found)[1]
     content = json.loads(json.dumps(as_json(found), allow_nan=False))
-    assert content["probability"]["unknown"] > 0.9
-    assert content["remainder"]["fraction"] == 1.0
-    assert content["remainder"]["component"], "what remains is located"
+    assert content["causes"][0]["effects"] == ["leak"]
+    assert 0.0 < content["left"]["fraction"] < 0.5
 
 
 def test_the_remainder_is_what_the_named_causes_do_not_close():
-    left = as_json(closing(partial(), 0.70, 0.76, 0.81))["remainder"]
+    left = as_json(closing(partial(), 0.70, 0.76, 0.81))["left"]
     assert left["fraction"] == pytest.approx(0.24)
     assert (left["low"], left["high"]) == (pytest.approx(0.19), pytest.approx(0.30))
     equation, component = left["equation"], left["component"]
     assert sum(component.values()) == pytest.approx(sum(equation.values()))
     assert sum(equation.values()) <= 1.0 + 1e-9
-    assert as_json(unknown())["remainder"]["fraction"] == 1.0
+    assert as_json(unknown())["left"]["fraction"] == 1.0
 
 
 def test_partial_says_what_to_add_what_it_closes_and_what_remains():
     status, text = verdict_sentence(closing(partial(), 0.70, 0.76, 0.81))
     assert status == "doubt"
-    assert text.startswith("leak is part of the gap (")
-    assert "closes 76 % (70 to 81 %) of the gap on recordings never fitted to. Add leak. Look at" in text
+    assert text.startswith(
+        "leak closes 76 % (70 to 81 %) of the gap on recordings never fitted to; that "
+    )
+    assert "this is the cause has a probability of" in text
+    assert "Add leak with leak = " in text
     assert "24 % (19 to 30 %) of the gap remains, most likely in f1 of tank (" in text
 
 
@@ -93,7 +95,7 @@ def test_partial_says_what_to_add_what_it_closes_and_what_remains():
     [
         (partial, (0.0, 0.1, 0.3), "do not add", "Add leak"),
         (unknown, (0.0, 0.1, 0.3), "do not add", "Add leak"),
-        (unknown, (0.3, 0.44, 0.48), "Adding leak would reduce the gap on recordings", "do not add"),
+        (unknown, (0.3, 0.44, 0.48), "closes 44 % (30 to 48 %) of the gap", "Add leak"),
         (unknown, (0.7, 0.74, 0.8), "Add leak all the same: it closes 74 % (70 to", "do not add"),
     ],
 )
@@ -118,7 +120,7 @@ def test_no_word_reassures_while_the_gap_stands_far_above_the_noise(verdict):
 def with_disturbance(found: Diagnosis, sd: float) -> Diagnosis:
     """No gap, with a disturbance [noise deviations] that is correlated over 20 ms."""
     seen = [replace(own, sd=sd, time_scale=0.02) for own in found.ranking.noise]
-    conclusion = replace(found.conclusion, verdict=NO_GAP, ambiguity_set=[], held=())
+    conclusion = replace(found.conclusion, verdict=NO_GAP, ambiguity_set=[])
     ranking = replace(found.ranking, noise=seen, no_cause=0.99)
     return replace(found, conclusion=conclusion, ranking=ranking, remaining=None)
 
@@ -146,14 +148,14 @@ def test_the_missing_term_is_a_file_beside_the_answer(tmp_path):
     )
     content = write_results(shown, tmp_path)
     assert json.loads((tmp_path / GAP).read_text(encoding="utf-8")) == content
-    assert content["remainder"]["term"] == TERM
+    assert content["left"]["term"] == TERM
     table = json.loads((tmp_path / TERM).read_text(encoding="utf-8"))
     assert table == term_table(replace(term, explained=0.9))
     assert table["state"] in ("h", "q")
     columns = table["columns"]
     assert columns["state"] == sorted(columns["state"])
     assert {len(column) for column in columns.values()} == {len(term.x)}
-    assert write_results(replace(found, remaining=None), tmp_path)["remainder"]["term"] is None
+    assert write_results(replace(found, remaining=None), tmp_path)["left"]["term"] is None
     assert not (tmp_path / TERM).exists(), "of an earlier diagnosis"
 
 

@@ -86,7 +86,7 @@ def test_a_doubt_has_a_reason_and_causes_that_hardly_may_act_have_no_line(name):
     assert warned.status == ("bad" if name == "unknown" else "doubt")
     rows = ranking_table(diagnosed(name)).rows
     assert any(row[1] != "< 1 %" for row in rows)
-    assert all(row[0] == "evaporation" for row in rows if row[1] == "< 1 %"), "the nearest, if any"
+    assert all(row[0] == "lag" for row in rows if row[1] == "< 1 %"), "the nearest, if any"
 
 
 def test_a_known_cause_is_named_with_its_size_and_what_it_closes():
@@ -208,5 +208,5 @@ def test_a_nominal_model_is_not_called_recalibrated():
     better = replace(gaps[NOMINAL], overall=Interval(value=0.5, low=0.5, high=0.5))
     reduction = replace(found.reduction, gaps={**gaps, NOMINAL: better})
     found = replace(found, reduction=reduction)
-    assert found.kept is found.nominal
+    assert found.model is found.nominal
     assert "model to use: nominal, without a cause" in calibrated_values(found, "good").caption

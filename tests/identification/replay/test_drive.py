@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.signal import lfilter
 
 from identification.replay import model_inputs as drive
 from identification.replay.model_inputs import model_inputs, smooth_supply, smooth_voltage
@@ -67,6 +68,14 @@ def test_a_supply_with_a_life_of_its_own_is_followed_within_millibars(name, life
 def test_the_air_balance_alone_would_miss_it(monkeypatch, life):
     monkeypatch.setattr(drive, "_is_white", lambda residual, period: True)
     assert rms(supply_error("test4", life=LIVES[life])) > 0.5 * NOISE
+
+
+def test_a_ripple_on_the_reading_at_all_times_does_not_enter_the_model():
+    recording = exact_recording("test1", share=1.0)
+    white = np.random.default_rng(0).standard_normal(len(recording))
+    ripple = 2.0 * NOISE * np.asarray(lfilter([np.sqrt(1.0 - 0.95**2)], [1.0, -0.95], white))
+    supply = smooth_supply(replace(recording, p1=recording.p1 + ripple), TRUE)
+    assert rms(supply - truth("test1").channels["p1"]) < 0.5 * rms(ripple)
 
 
 def test_consumed_air_is_drawn_from_the_supply():

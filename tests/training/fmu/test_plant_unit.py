@@ -36,12 +36,15 @@ def unit(tmp_path_factory):
 
 
 def drawn_parameters(rng: np.random.Generator, effects: Sequence[Effect]) -> Parameters:
-    """Parameters within 5 % of the calibrated ones, with effects of the largest size that is drawn."""
+    """Parameters within 5 % of the calibrated ones, with effects of the largest size that is drawn, of
+    any form."""
     changes = {}
     for symbol in ("R", "V2", "V3", "alphaPV", "alphaMV", "RML", "cPV"):
         changes[symbol] = Parameters.calibrated()[symbol] * rng.uniform(0.95, 1.05)
     for effect in effects:
         changes |= {size.symbol: size.drawn[1] for size in effect.drawn[0] if size.drawn}
+        forms = {size.symbol: size.domain or (0.0, 0.0) for size in effect.sizes if size.spread}
+        changes |= {symbol: rng.uniform(low, high) for symbol, (low, high) in forms.items()}
     return Parameters.calibrated().replace(**changes)
 
 

@@ -10,7 +10,8 @@ from typing import Any
 
 from epv_env.plant.channels import MEASURED_CHANNELS
 from epv_env.plant.coefficients import folded
-from epv_env.plant.effects.coil import coil_current
+from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current
+from epv_env.plant.effects.measurement import command_delays
 from epv_env.plant.effects.registry import CONSTANTS, Effects, with_laws
 from epv_env.plant.effects.step_limits import longest_step
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
@@ -197,6 +198,7 @@ def _formulas() -> dict[str, str]:
         "coil_heat": written(p["theta_coil"]),
     }  # fmt: skip
     sizes = [row.name for row in CONSTANTS if row.is_size]
+    delay_on, delay_off = command_delays(p)
     return {
         "coefficients": _lines("c->{} = {};", folded(p, volume)._asdict()),
         "effects": _lines("effects->{} = {};", {row.name: row.value(p) for row in CONSTANTS}),
@@ -207,7 +209,9 @@ def _formulas() -> dict[str, str]:
         + _lines("value[V_state_{0}] = q->{1};", {name: name for name in State._fields}),
         "effects_act": _any("effects->", sizes),
         "forced": _any("u->", list(FORCES)),
-        "delay": "V_t_delay",
+        "off_voltage": repr(OFF_VOLTAGE),
+        "delay_on": written(delay_on),
+        "delay_off": written(delay_off),
     }
 
 

@@ -242,7 +242,7 @@ $inputs
     if (commanded == m->acting_U)
         m->delay_left = 0.0;
     else if (m->delay_left <= 0.0)
-        m->delay_left = value[$delay];
+        m->delay_left = commanded > $off_voltage ? $delay_on : $delay_off;
     before = lesser(m->delay_left, h);
     m->delay_left -= before;
     u->U = m->acting_U;

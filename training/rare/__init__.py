@@ -1,1 +1,0 @@
-"""Probabilities of rare episodes, and what a controller can never do."""
