@@ -31,6 +31,11 @@ NUMBER = r"[+-]?\s?(?:\d+(?:[.,'’\s]\d{3})*(?:[.,]\d*)?|[.,]\d+)(?:[eE][+-]?\d
 CELL = re.compile(rf"({NUMBER})\s*([^\W\d_][^;|\t]{{0,11}}|[%°][^;|\t]{{0,3}})?")
 """The same, perhaps with a unit."""
 
+SURE_DECIMAL = re.compile(
+    r"[+-]?\s?(?:(?:0|\d{4,})?([.,])\d+|[\d.,'’\s]+([.,])(?:\d{1,2}|\d{4,}))(?:[eE][+-]?\d+)?"
+)
+"""A number whose last sign is a decimal one: not three digits follow, or more than three or 0 precede."""
+
 SURE_THOUSANDS = r"[+-]?[1-9]\d{{0,2}}(?:\{mark}\d{{3}})+"
 
 

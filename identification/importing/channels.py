@@ -119,6 +119,8 @@ class MappedChannel:
     """Line of each sample in a text file, (samples,)."""
     filled: int
     """Missing readings that were filled from their neighbours."""
+    left: int
+    """Missing readings at the begin and the end, which were left out."""
     period: float | None = None
     """Between samples [s], once they lie on a uniform grid; None: not known, or they jitter."""
     treated: str = "as recorded"
@@ -264,6 +266,7 @@ def _mapped(
         values=entry.factor * unit.size * readings[good] + offset,
         lines=None if channel.lines is None else channel.lines[good],
         filled=int(np.count_nonzero(good & ~np.isfinite(channel.values))),
+        left=int(good.argmax() + good[::-1].argmax()),
     )
 
 

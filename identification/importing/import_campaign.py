@@ -60,7 +60,8 @@ class ImportedFile:
                 "to SI": channel.conversion,
                 "rate": f"{channel.rate:.6g} Hz",
                 "samples": channel.treated
-                + (f", {channel.filled} missing filled" if channel.filled else ""),
+                + (f", {channel.filled} missing filled" if channel.filled else "")
+                + (f", {channel.left} missing at the ends left out" if channel.left else ""),
             }
             for channel in self.channels
         ]

@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from identification.importing.cells import MISSING, X_COLUMN, Columns, is_missing, is_value
+from identification.importing.cells import MISSING, SURE_DECIMAL, X_COLUMN, Columns, is_missing, is_value
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import ImportingError, SourceChannel
+from identification.importing.times import is_point
 from identification.importing.units import is_unit, parsed_unit
 
 COMMENT = re.compile(r"\s*(#(?!NV|N/A|DIV|VAL|WERT)|%|//|!)")
@@ -135,12 +136,11 @@ def read_text(path: Path, missing: Collection[str] = ()) -> tuple[str, list[Sour
     names, units, first = _header(table)
     stop, told = _end(table, text, first)
     data = [line for _, line in table.lines[first:stop]]
-    sample = "".join(table.lines[k][1] for k in table.sampled())
-    commas = table.separator != "," and sample.count(",") > sample.count(".")
+    decimal = _decimal(table)
     frame: Any = pd.read_csv(
         io.StringIO("\n".join(data)),
         sep=r"\s+" if table.separator == " " else table.separator,
-        decimal="," if commas else ".",
+        decimal=decimal,
         names=list(range(len(names) + 1)),
         index_col=False,
         skipinitialspace=True,
@@ -158,11 +158,16 @@ def read_text(path: Path, missing: Collection[str] = ()) -> tuple[str, list[Sour
     if copies.any():
         told.append(f"{copies.sum()} copies of lines left out, such as line {lines[copies.argmax()]}")
     shown = {"\t": "tab", " ": "blanks"}.get(table.separator, f"{table.separator!r}")
-    dialect = f"separator {shown}, decimal {',' if commas else '.'!r}, {encoding}"
-    columns = Columns(
-        frame=frame[~copies], lines=lines, decimal="," if commas else ".", names=names, units=units
-    )
+    dialect = f"separator {shown}, decimal {decimal!r}, {encoding}"
+    columns = Columns(frame=frame[~copies], lines=lines, decimal=decimal, names=names, units=units)
     return f"text ({'; '.join([dialect, *told])})", list(columns.channels())
+
+
+def _decimal(table: TextTable) -> str:
+    """The decimal sign of most of the sampled cells in which a sign cannot mark thousands."""
+    cells = [cell for line in table.sampled() for cell in table.cells(line) if not is_point(cell)]
+    signs = Counter(found[1] or found[2] for cell in cells if (found := SURE_DECIMAL.fullmatch(cell)))
+    return "," if table.separator != "," and signs[","] > signs["."] else "."
 
 
 def _end(table: TextTable, text: str, first: int) -> tuple[int, list[str]]:
@@ -177,8 +182,8 @@ def _end(table: TextTable, text: str, first: int) -> tuple[int, list[str]]:
         return stop, [f"below the samples, line{'s' * (len(numbers) > 1)} {ends} ({begins}) left out"]
     number, last = table.lines[-1]
     *above, end = (len(line.rstrip().rpartition(table.separator)[2]) for _, line in table.lines[first:])
-    if text.endswith(last) and end < min(above, default=0):  # a file that was cut, without end of line
-        return stop - 1, [f"line {number} is cut off in its last cell and left out"]
+    if text.endswith(last) and end < max(above, default=0):  # a file that was cut, without end of line
+        return stop - 1, [f"line {number} may be cut off in its last cell and is left out"]
     return stop, []
 
 

@@ -3,6 +3,8 @@
 With the coil on and at rest, the open inlet makes p3 equal to p1, and the current is U/R. With the coil
 off, p3 vents through choked flow towards absolute zero at a known rate and ends at ambient pressure; p1
 and p2 do not. A recording that contradicts this is refused. Why is not guessed, nothing is converted.
+What a fault of valve, driver or sensor can cause, such as a current that does not end, is left to the
+diagnosis.
 """
 
 import re
@@ -28,8 +30,9 @@ LEAST_VOLTAGE = 1.0 / 6.0
 """Greatest voltage of a coil that is on at all, over the least operating voltage; noise has 0.012 V."""
 MOST_REST_VOLTAGE = 0.1
 """Voltage of a coil that is off, over its voltage when it is on; flyback is shorter than half."""
-MOST_REST_CURRENT = 0.03
-"""Current of a coil that is off, over the sensor's range: three times the accuracy."""
+MOST_REST_CURRENT = 0.5
+"""Current of a coil that is off, over its holding current: an eddy current, a leaking driver or an offset
+of the sensor leaves less, readings of another signal more."""
 DECAY_TIME = 0.03
 """Time after which no current flows in a coil that was switched off [s]; six time constants."""
 SENSOR_FAULT = 0.65
@@ -141,7 +144,6 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
         yield f"I switches at {current[np.argmax(np.abs(current))]:.4g} A, and the voltage never does"
     if not on[0] and abs(level) > rules.sensors["U"].margin:
         yield f"the voltage is {level:.4g} V, neither off nor on"
-    settled = current[start]
     if on[0]:
         if not low <= level <= high:
             yield f"the energised coil has {level:.4g} V, and {low:g} to {high:g} V are usual"
@@ -156,12 +158,13 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
                 f"{level:.4g} V and a holding current of {held:.4g} A make {resistance:.4g} ohm, and "
                 f"coils have {least:g} to {greatest:g} ohm"
             )
-        samples = np.arange(len(on))
-        off_since = samples - np.maximum.accumulate(np.where(on, samples, -1))
-        settled = current[off_since * period > DECAY_TIME]
-    rest = float(np.median(settled)) if len(settled) else 0.0
-    if abs(rest) > MOST_REST_CURRENT * rules.sensors["I"].high:
-        yield f"a current of {rest:.4g} A flows while the coil is off"
+    samples = np.arange(len(on))
+    off_since = samples - np.maximum.accumulate(np.where(on, samples, -len(on)))
+    settled = current[off_since * period > DECAY_TIME]
+    if np.any(on) and len(settled):
+        rest, held = float(np.median(settled)), float(np.median(current[on]))
+        if abs(rest) > MOST_REST_CURRENT * abs(held):
+            yield f"a current of {rest:.4g} A flows while the coil is off, and {held:.4g} A while it is on"
 
 
 def _pressures(

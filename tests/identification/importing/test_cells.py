@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from identification.importing.import_campaign import read_files, source_table
+from identification.importing.import_campaign import import_text, read_files, source_table
 from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
 from identification.recordings.recording import Recording
@@ -93,6 +93,16 @@ def test_a_cell_that_may_mean_two_things_or_none_is_named(true, cell, rule, tmp_
     cells["p2"][99] = cell
     said = f"p2 [mbar] is {cell!r}, {rule}"
     with pytest.raises(ImportingError, match=f"{re.escape(said)}.*line 101.*mend the cell"):
+        read(written(tmp_path / "run", cells))
+
+
+@pytest.mark.parametrize(("mark", "decimal"), [(".", ","), (",", ".")])
+def test_whole_columns_of_thousands_alone_are_not_taken_for_decimals(true, mark, decimal, tmp_path):
+    cells = {name: [c.replace(".", decimal) for c in own] for name, own in cells_of(true).items()}
+    for name in ("p1", "p2", "p3"):
+        cells[name] = [f"{float(cell):,.0f}".replace(",", mark) for cell in cells_of(true)[name]]
+    first = cells["p1"][0]
+    with pytest.raises(ImportingError, match=rf"p1 .mbar. is '{first}', which may be .*\(line 2\)"):
         read(written(tmp_path / "run", cells))
 
 
@@ -190,6 +200,14 @@ def test_over_range_readings_are_filled_or_named_with_their_lines(true, mark, tm
         read(written(tmp_path / "many", cells))
 
 
+def test_readings_beyond_the_range_at_an_end_are_said_to_be_left_out(true, tmp_path):
+    cells = cells_of(true)
+    cells["p2"][-30:] = 30 * ["OL"]
+    made = read(written(tmp_path / "run", cells))
+    assert_true(made, true, lost=30)
+    assert "30 missing at the ends left out" in import_text(made)
+
+
 @pytest.mark.parametrize("mark", ["ERR", "-9999", "no data", "******"])
 def test_a_mapping_file_names_the_mark_of_a_missing_reading(true, mark, tmp_path):
     cells = cells_of(true)
@@ -215,6 +233,7 @@ BELOW = {
     "summary rows": ("\n\nMin;0;0;6;6;6\nMax;1;2;3;4;5\nMean;1;2;3;4;5\n", "{} to {} ('Min',", 2, 4),
     "a word": ("\nstopped by hand\n", "line {} ('stopped by hand')", 1, 1),
     "a cut line": ("\n0.75;0.44;18.9", "line {} ('0.75')", 1, 1),
+    "a cut cell": ("\n0.75;0.44;18.9;12543.0;7000.0;700.0", "line {} may be cut off", 1, 1),
 }  # fmt: skip
 
 

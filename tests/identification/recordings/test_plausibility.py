@@ -94,7 +94,9 @@ OTHERS = {
     "mV": (scaled(1e3, 0, "U"), "the energised coil has 1.89.*e.04 V"),
     "kV": (scaled(1e-3, 0, "U"), "U switches at 0.0189.* V, and 6 to 32.32 V are usual: .* of U_V"),
     "mV and mA": (scaled(1e3, 0, "U", "I"), "6 to 32.32 V are usual: check unit"),
-    "offset of I": (scaled(1, 0.1, "I"), "a current of 0.1 A flows while the coil is off: check unit"),
+    "I of a coil that stays on": (
+        lambda r: replace(r, I=np.where(r.energised, r.I, 0.3)), "a current of 0.3 A flows while the coil"
+    ),
     "offset of U": (scaled(1, 4.0, "U"), "the voltage is 4 V while the coil is off: check unit"),
     "ms": (timed(1e3), "p3 vents at 0.007.* 1/s, .*: check unit and rate of time_s"),
     "ks": (timed(1e-3), "p3 vents at 7.*e.03 1/s, .*: check unit and rate of time_s"),
@@ -112,6 +114,20 @@ HIDDEN_AT_REST = ("p2 in psi", "100 times too small and ambient added")
 def test_the_campaign_itself_is_accepted(tmp_path):
     write_campaign(bench(), tmp_path / "good")
     assert len(read_campaign(tmp_path / "good").recordings) == 2
+
+
+LEFT = {
+    "a current that does not end": lambda r: replace(r, I=np.where(r.energised, r.I, r.I + 0.12)),
+    "an offset of the current": scaled(1, 0.1, "I"),
+    "a sensor's error of p3": scaled(1, 0.3 * AMBIENT, "p3"),
+}
+
+
+@pytest.mark.parametrize("case", LEFT)
+def test_what_the_diagnosis_is_for_is_not_refused(case, tmp_path):
+    first = LEFT[case](bench().recordings[0])
+    write_campaign(replace(bench(), recordings=(first,)), tmp_path / "new")
+    assert len(read_campaign(tmp_path / "new").recordings) == 1
 
 
 @pytest.mark.parametrize("case", CASES)
