@@ -2,16 +2,16 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from decimal import Decimal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import pandas as pd
 import scipy.io
 from numpy.typing import NDArray
 
 from identification.importing import times
+from identification.importing.cells import Columns
 from identification.importing.source_file import (
     NO_NUMBERS,
     SourceChannel,
@@ -111,23 +111,15 @@ def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
     found = parquet.read_metadata(path)
     check_unpacked(path, found.num_rows * found.num_columns * NUMBER)
     table = parquet.read_table(path)
-    return "Parquet", [_parquet_channel(field, table.column(field.name)) for field in table.schema]
-
-
-def _parquet_channel(field: Any, column: Any) -> SourceChannel:
-    values = column.to_numpy()
-    first = next((value for value in values if value is not None), None)
-    if isinstance(first, Decimal):
-        values = values.astype(float)
-    elif isinstance(first, str) and times.is_point(first):
-        values = times.points_in_time(pd.Series(values))
-    if values.dtype.kind not in "iufMm":
-        return unread(field.name, NO_NUMBERS)
-    unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-    numbers, begin = times.seconds(values)
-    return SourceChannel(
-        name=field.name, unit="s" if values.dtype.kind in "Mm" else unit, values=numbers, begin=begin
+    told = [field.metadata or {} for field in table.schema]
+    columns = Columns(
+        frame=table.to_pandas(ignore_metadata=True).set_axis(range(table.num_columns), axis="columns"),
+        lines=np.arange(1, table.num_rows + 1),
+        decimal=".",
+        names=table.column_names,
+        units=[metadata.get(b"unit", b"").decode("utf-8", "replace") for metadata in told],
     )
+    return "Parquet", [replace(channel, lines=None) for channel in columns.channels()]
 
 
 HDF5_SIGNATURE = b"\x89HDF"

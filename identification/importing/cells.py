@@ -1,4 +1,4 @@
-"""What the cells of a text table say: numbers with units, points in time, readings that are missing."""
+"""What the cells of a table say: numbers with units, points in time, readings that are missing."""
 
 import re
 from collections.abc import Iterator, Sequence
@@ -34,7 +34,7 @@ CELL = re.compile(rf"({NUMBER})\s*([^\W\d_][^;|\t]{{0,11}}|[%°][^;|\t]{{0,3}})?
 SURE_DECIMAL = re.compile(
     r"[+-]?\s?(?:(?:0|\d{4,})?([.,])\d+|[\d.,'’\s]+([.,])(?:\d{1,2}|\d{4,}))(?:[eE][+-]?\d+)?"
 )
-"""A number whose last sign is a decimal one: not three digits follow, or more than three or 0 precede."""
+"""A number whose last sign is decimal: not three digits follow, or more than three or a 0 precede."""
 
 SURE_THOUSANDS = r"[+-]?[1-9]\d{{0,2}}(?:\{mark}\d{{3}})+"
 
@@ -98,7 +98,7 @@ X_COLUMN = "X_Value"
 
 @dataclass(frozen=True, kw_only=True)
 class Columns:
-    """The samples of a text file by column."""
+    """The samples of a table by column."""
 
     frame: Any
     """Cells by number of column; the index counts the lines of samples."""

@@ -31,8 +31,8 @@ LEAST_VOLTAGE = 1.0 / 6.0
 MOST_REST_VOLTAGE = 0.1
 """Voltage of a coil that is off, over its voltage when it is on; flyback is shorter than half."""
 MOST_REST_CURRENT = 0.5
-"""Current of a coil that is off, over its holding current: an eddy current, a leaking driver or an offset
-of the sensor leaves less, readings of another signal more."""
+"""Current of a coil that is off, over that of one that is on: an eddy current, a leaking driver or an
+offset of the sensor leaves less, readings of another signal more."""
 DECAY_TIME = 0.03
 """Time after which no current flows in a coil that was switched off [s]; six time constants."""
 SENSOR_FAULT = 0.65
@@ -164,7 +164,7 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
     if np.any(on) and len(settled):
         rest, held = float(np.median(settled)), float(np.median(current[on]))
         if abs(rest) > MOST_REST_CURRENT * abs(held):
-            yield f"a current of {rest:.4g} A flows while the coil is off, and {held:.4g} A while it is on"
+            yield f"a current of {rest:.4g} A flows while the coil is off, and {held:.4g} A while on"
 
 
 def _pressures(

@@ -232,8 +232,8 @@ def nulls(at: Path, true: Recording) -> Path:
 
 
 def texts(at: Path, true: Recording) -> Path:
-    """Parquet whose p2 is a column of texts."""
-    frame(true, true.time).astype({"p2 [bar]": str}).to_parquet(at.with_suffix(".parquet"))
+    """Parquet whose p2 is a column of words."""
+    frame(true, true.time).assign(**{"p2 [bar]": "high"}).to_parquet(at.with_suffix(".parquet"))
     return at.with_suffix(".parquet")
 
 

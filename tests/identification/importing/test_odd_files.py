@@ -133,7 +133,7 @@ def test_only_a_name_of_validation_holds_a_file_out(true, name, role, tmp_path):
 
 @pytest.mark.parametrize(
     ("write", "fault"),
-    [(texts, "p2 [bar] holds no numbers: export it"),
+    [(texts, "p2 [bar] is 'high', not a number (line 1)"),
      (lambda at, r: mat5(at, {**interval(r), "p2_bar": 1j * r.p2}), "p2_bar holds complex numbers")],
 )  # fmt: skip
 def test_a_series_without_numbers_that_is_needed_is_refused(true, write, fault, tmp_path):

@@ -113,7 +113,6 @@ SAME_RATE: dict[str, Callable[[Path, Recording], Path]] = {
     ),
     "Parquet, points in time": lambda at, r: parquet(at, frame(r, stamps(r))),
     "Parquet, texts": lambda at, r: parquet(at, frame(r, zoned(r, ""))),
-    "Parquet, durations": lambda at, r: parquet(at, frame(r, pd.to_timedelta(r.time, unit="s"))),
     "TDMS, points in time": lambda at, r: tdms(at, r, waveform=False),
     "TDMS, waveforms": lambda at, r: tdms(at, r, waveform=True),
 }

@@ -95,7 +95,7 @@ OTHERS = {
     "kV": (scaled(1e-3, 0, "U"), "U switches at 0.0189.* V, and 6 to 32.32 V are usual: .* of U_V"),
     "mV and mA": (scaled(1e3, 0, "U", "I"), "6 to 32.32 V are usual: check unit"),
     "I of a coil that stays on": (
-        lambda r: replace(r, I=np.where(r.energised, r.I, 0.3)), "a current of 0.3 A flows while the coil"
+        lambda r: replace(r, I=np.where(r.energised, r.I, 0.3)), "a current of 0.3 A flows while"
     ),
     "offset of U": (scaled(1, 4.0, "U"), "the voltage is 4 V while the coil is off: check unit"),
     "ms": (timed(1e3), "p3 vents at 0.007.* 1/s, .*: check unit and rate of time_s"),
