@@ -44,11 +44,6 @@ def is_value(cell: str) -> bool:
     return bool(CELL.fullmatch(cell) or times.is_point(cell))
 
 
-def is_missing(cell: str) -> bool:
-    """Whether a cell holds no reading, or one beyond the range."""
-    return not cell or cell in MISSING or bool(OVER_RANGE.fullmatch(cell))
-
-
 def numbers(cells: Any, decimal: str) -> tuple[NDArray, str]:
     """The numbers of a column, (samples,), and the unit that stands in its cells.
 
@@ -65,9 +60,7 @@ def numbers(cells: Any, decimal: str) -> tuple[NDArray, str]:
     parts = texts.str.extract(rf"^(?:{CELL.pattern})$").fillna("")
     check_cells(parts[0] != "", texts, "not a number")
     unit = str(next(iter(parts[1]), ""))
-    check_cells(
-        parts[1] == unit, texts, f"not a number of the unit {unit!r}" if unit else "not a number"
-    )
+    check_cells(parts[1] == unit, texts, f"not a number{f' of the unit {unit!r}' if unit else ''}")
     plain = _plain(parts[0].str.replace(r"[\s'’]", "", regex=True), texts, decimal)
     values[plain.index] = pd.to_numeric(plain)
     return values.to_numpy(dtype=float), unit

@@ -138,17 +138,8 @@ class MappedChannel:
         return f"× {self.unit.size * self.factor:g}{ambient}"
 
 
-class UnclearChannels(ImportingError):
-    """A file lacks channels of a recording, or their meaning or unit is unclear."""
-
-    def __init__(self, sentence: str, missing: Sequence[str]):
-        """missing: channels of the recording that it lacks."""
-        super().__init__(sentence)
-        self.missing = missing
-
-
 def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, SourceChannel]:
-    """The channel of the file for each of a recording. Raises UnclearChannels."""
+    """The channel of the file for each of a recording. Raises ImportingError."""
     named = {
         name: [named_channel(source, entry.source)]
         for name, entry in mapping.channels.items()
@@ -177,7 +168,7 @@ def _unclear(
     several: Mapping[str, Sequence[SourceChannel]],
     silent: Sequence[str],
     missing: Sequence[str],
-) -> UnclearChannels:
+) -> ImportingError:
     """All that a file leaves unclear, with a mapping file that says it.
 
     several, silent: channels that several of the file may be, or that have no unit.
@@ -196,8 +187,9 @@ def _unclear(
     sources = {n: source.label(c) for n, c in chosen.items() if n in (*several, *silent)}
     units = {name: EXAMPLES[QUANTITY[name]] for name in (*silent, *missing)}
     example = mapping_example(sources | dict.fromkeys(missing, "NAME"), units)
-    sentence = f"{source.path}: {'; '.join(said)}: say it in a mapping file such as {example}"
-    return UnclearChannels(sentence, missing)
+    return ImportingError(
+        f"{source.path}: {'; '.join(said)}: say it in a mapping file such as {example}"
+    )
 
 
 def mapped_channels(

@@ -16,14 +16,14 @@ import pandas as pd
 from epv_env.common.files import read_bytes
 from epv_env.common.units import BAR
 from identification.importing.binary_files import read_matlab, read_mdf, read_parquet, read_tdms
-from identification.importing.channels import MappedChannel, UnclearChannels, mapped_channels
+from identification.importing.channels import MappedChannel, mapped_channels
 from identification.importing.common_grid import on_common_grid
 from identification.importing.mapping_file import FORMAT, MappingFile, meaning, proposed, read_mapping
 from identification.importing.source_file import NO_NUMBERS, ImportingError, SourceFile, usable
 from identification.importing.text_files import read_text
 from identification.recordings.columns import Place
 from identification.recordings.plausibility import switches
-from identification.recordings.recording import RULES, Campaign, Recording, RecordingRules
+from identification.recordings.recording import CHANNELS, RULES, Campaign, Recording, RecordingRules
 
 FORMATS = (
     ("MDF", read_mdf, (".mf4", ".mdf", ".dat")),
@@ -82,10 +82,8 @@ class ImportedCampaign:
         found = {}
         for file in self.files:
             told = [c.lines for c in file.channels if c.lines is not None and not file.source.joined]
-            period = None if told else file.recording.period
-            lines = told[0] if told else None
-            place = Place(file=str(file.source.path), lines=lines, period=period)
-            found[file.recording.name] = place
+            where: dict[str, Any] = {"lines": told[0]} if told else {"period": file.recording.period}
+            found[file.recording.name] = Place(file=str(file.source.path), **where)
         return found
 
     def provenance(self) -> dict[str, Any]:
@@ -193,17 +191,16 @@ def _imported(
     rate: float | None,
 ) -> ImportedFile:
     """One of the files as a recording; ambient: p_env [Pa absolute], None if nobody gave it."""
-    try:
-        channels = mapped_channels(source, content, ambient)
-    except UnclearChannels as error:
-        holding = [s.path.name for s in sources if set(error.missing) & set(proposed(s.channels))]
-        if not holding:
-            raise
+    known = {*proposed(source.channels), *(n for n, e in content.channels.items() if e.source)}
+    missing = [name for name in CHANNELS if name not in known]
+    holding = [s.path.name for s in sources if {*missing} & set(proposed(s.channels))]
+    if holding:
         example = {"format": FORMAT, "recordings": {source.path.name: {"join": holding}}}
         raise ImportingError(
-            f"{source.path} has no {', '.join(error.missing)}, which {', '.join(holding)} may hold: if "
+            f"{source.path} has no {', '.join(missing)}, which {', '.join(holding)} may hold: if "
             f"these are one recording, join them in a mapping file such as {json.dumps(example)}"
-        ) from None
+        )
+    channels = mapped_channels(source, content, ambient)
     period, channels = on_common_grid(source.path, channels, rate)
     signals: dict[str, Any] = {channel.name: channel.values for channel in channels}
     entry = content.recording(source.path)

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from identification.importing.cells import MISSING, SURE_DECIMAL, X_COLUMN, Columns, is_missing, is_value
+from identification.importing.cells import MISSING, OVER_RANGE, SURE_DECIMAL, X_COLUMN, Columns, is_value
 from identification.importing.mapping_file import meaning
 from identification.importing.source_file import ImportingError, SourceChannel
 from identification.importing.times import is_point
@@ -77,8 +77,9 @@ class TextTable:
         return cells_of(self.lines[line][1], self.separator)
 
     def is_known(self, cell: str) -> bool:
-        """Whether a cell can be read, also as a missing reading."""
-        return is_value(cell) or is_missing(cell) or cell in self.missing
+        """Whether a cell can be read, also as a reading that is missing or beyond the range."""
+        missing = not cell or cell in MISSING or cell in self.missing
+        return missing or is_value(cell) or bool(OVER_RANGE.fullmatch(cell))
 
     def is_sample(self, line: int) -> bool:
         """Whether a line has all cells, perhaps a comment after them, and begins as samples do."""

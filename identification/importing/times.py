@@ -1,7 +1,7 @@
 """Times of samples as files write them: points in time, times of day, and what they begin with."""
 
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 
 import numpy as np
 import pandas as pd
@@ -69,7 +69,9 @@ def _local_points(cells: pd.Series) -> NDArray:
     time = np.where(half.notna(), time % (12 * HOUR) + 12 * HOUR * half.eq("p"), time)
     dates = parts[0].dropna().unique()
     orders = ("." in dates[0], "." not in dates[0]) if len(dates) else ()  # a dot follows the day
-    days = min((_days(dates, day_first) for day_first in orders), key=_span, default={})
+    both = [_days(dates, day_first) for day_first in orders]
+    # A recording is short, if day and month are read right.
+    days = min(both, key=lambda found: max(found.values()) - min(found.values()), default={})
     day = parts[0].map(days).astype("datetime64[ns]")
     check_cells(parts[0].isna() | day.notna(), cells, RULE)
     stamps = day.fillna(pd.Timestamp(0)).to_numpy("M8[ns]").astype(np.int64) + time
@@ -90,11 +92,6 @@ def _days(dates: Iterable[str], day_first: bool) -> dict[str, pd.Timestamp]:
     return days
 
 
-def _span(days: Mapping[str, pd.Timestamp]) -> pd.Timedelta:
-    """Time from the first to the last: of a recording, it is short if day and month are read right."""
-    return max(days.values()) - min(days.values())
-
-
 def _unwound(stamps: NDArray, hours: NDArray, *, marked: bool, dated: bool) -> NDArray:
     """Stamps that go on after midnight, and after 12:59 on a clock of twelve hours.
 
@@ -112,15 +109,9 @@ def _unwound(stamps: NDArray, hours: NDArray, *, marked: bool, dated: bool) -> N
 
 
 def seconds(values: NDArray) -> tuple[NDArray, np.datetime64 | None]:
-    """Numbers as they are, durations in seconds, points in time in seconds from the first; and that one.
-
-    values: (samples,) numbers, timedelta64 or datetime64; the first point in time is None for others.
-    """
-    second = np.timedelta64(1, "s")
-    if values.dtype.kind == "m":
-        return values / second, None
+    """Numbers as they are; points in time in seconds from the first, (samples,), and that."""
     if values.dtype.kind != "M":
         return np.asarray(values, dtype=float), None
     known = values[~np.isnat(values)]
     begin = known[0] if len(known) else np.datetime64("NaT")
-    return (values - begin) / second, begin
+    return (values - begin) / np.timedelta64(1, "s"), begin
