@@ -28,11 +28,8 @@ from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
 from identification.gap.report.gap_json import write_results
 from identification.gap.search.onset import Span, in_span, likeliest_span, spans_of_causes
-from identification.gap.search.screening import (
-    CauseSignature,
-    assess_separability,
-    simulate_signatures,
-)
+from identification.gap.search.screening import CauseSignature, simulate_signatures
+from identification.gap.search.separability import assess_separability
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import (
     HELD_OUT_EVERY,
