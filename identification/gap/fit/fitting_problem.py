@@ -238,6 +238,11 @@ class FittingProblem:
         run_values = np.zeros((len(self.plant.runs), len(hypothesis.run_parameters)))
         return Estimate(hypothesis=hypothesis, vector=vector, run_values=run_values)
 
+    def nominal_start(self) -> Estimate:
+        """The nominal model; derivatives of the calibrated parameters are taken there."""
+        start = self.start(Hypothesis(causes=()), {})
+        return replace(start, slopes=replace(self.slopes, calibrated=None))
+
     def parameters(self, estimate: Estimate) -> tuple[FreeParameter, ...]:
         """Parameters of the estimate's vector: the calibrated ones, then those of its causes."""
         return (*self.plant.parameters, *estimate.hypothesis.parameters)

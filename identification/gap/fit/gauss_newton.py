@@ -18,9 +18,9 @@ from identification.gap.fit.variable_projection import (
 )
 from identification.gap.plant import noise_weighted
 
-MOST_DAMPING = 1e6
-"""Greatest damping of Levenberg and Marquardt, relative to the diagonal [1]; a fit ends at a tenth of
-it, where a step is too short to gain anything."""
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 0.1, 1e-6, 1e6
+"""Damping of Levenberg and Marquardt relative to the diagonal [1]: nearly none at first, as starts are
+expected to be close; a fit ends at the greatest, where a step is too short to gain anything."""
 
 
 def linearise(
@@ -205,7 +205,7 @@ class _Search:
         self.problem = problem
         self.best = start
         self.trial = start
-        self.damping = 0.1  # nearly none, as starts are expected to be close
+        self.damping = FIRST_DAMPING
         self.equations: NormalEquations | None = None
 
     def advance(self, runs: Sequence[LinearisedRun], rival_chi_square: float) -> None:
@@ -221,14 +221,14 @@ class _Search:
             self.trial, self.equations = self.best, None
             return
         else:
-            self.damping = min(10.0 * self.damping + 1e-6, MOST_DAMPING)  # Marquardt 1963
+            self.damping = min(10.0 * self.damping, MOST_DAMPING)  # Marquardt 1963
             current = self.equations
         step, decrease = current.step(*self.problem.ends(self.best), self.damping)
         self.trial = replace(self.best, vector=self.best.vector + step)
         self._decide(decrease, rival_chi_square)
 
     def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
-        self.damping = max(0.2 * self.damping, 1e-9)
+        self.damping = max(self.damping / 10.0, LEAST_DAMPING)
         self.equations = equations
         # Run parameters of the causes take the step as well; run offsets stay linear.
         run_values = self.trial.run_values.copy()
@@ -248,7 +248,7 @@ class _Search:
         hopeless = 3.0 * max(rival_chi_square - readings, 0.0) + 0.05 * readings
         self.best = replace(
             self.best,
-            converged=bool(decrease < enough or self.damping >= 0.1 * MOST_DAMPING),
+            converged=bool(decrease < enough or self.damping == MOST_DAMPING),
             # Steps of a nonlinear model gain more than they predict at first.
             given_up=bool(excess - 3.0 * decrease > hopeless),
         )

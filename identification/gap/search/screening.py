@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, cause_places
 from identification.gap.fit.variable_projection import (
+    RIDGE,
     ChangedRuns,
     LinearisedRun,
     NormalEquations,
@@ -233,17 +234,21 @@ def _bounded_last_step(equations: NormalEquations, low: float, high: float) -> t
 
     All other numbers of the vector are free.
     """
-    hessian, gradient = equations.hessian, equations.gradient
-    k = len(gradient) - 1
-    others = hessian[:k, :k] + 1e-9 * np.eye(k)
-    solved = np.linalg.solve(others, np.column_stack([gradient[:k], hessian[:k, k]]))
-    curvature = hessian[k, k] - hessian[k, :k] @ solved[:, 1]
-    slope = gradient[k] - hessian[k, :k] @ solved[:, 0]
-    step = float(np.clip(slope / max(curvature, 1e-12), low, high))
-    left = (
-        equations.chi_square - gradient[:k] @ solved[:, 0] - 2 * step * slope + step * step * curvature
-    )
+    curvature, slope, explained = _without_first(equations, len(equations.gradient) - 1)
+    step = float(np.clip(slope[0] / (curvature[0, 0] + RIDGE), low, high))
+    left = equations.chi_square - explained - 2 * step * slope[0] + step * step * curvature[0, 0]
     return step, float(left)
+
+
+def _without_first(equations: NormalEquations, k: int) -> tuple[NDArray, NDArray, float]:
+    """Hessian and gradient of the numbers behind the first k, which are minimised over; what these
+    explain of the chi-square [1]."""
+    hessian, gradient = equations.hessian, equations.gradient
+    cross = hessian[:k, k:]
+    own = hessian[:k, :k] + RIDGE * np.eye(k)
+    solved = np.linalg.solve(own, np.column_stack([cross, gradient[:k]]))
+    reduced = gradient[k:] - cross.T @ solved[:, -1]
+    return hessian[k:, k:] - cross.T @ solved[:, :-1], reduced, float(gradient[:k] @ solved[:, -1])
 
 
 def with_changes(run: LinearisedRun, changes: Sequence[NDArray]) -> LinearisedRun:
@@ -271,7 +276,7 @@ def best_pairs(
         if signatures[pair[0]].cause.name != signatures[pair[1]].cause.name:
             own = np.array(pair)
             part = gram[np.ix_(own, own)]
-            best = bounded_minimiser(part + 1e-9 * np.eye(2), moment[own], *shares[own].T)
+            best = bounded_minimiser(part + RIDGE * np.eye(2), moment[own], *shares[own].T)
             found.append((float(best @ part @ best - 2.0 * best @ moment[own]), pair, best))
     of_causes: dict[frozenset[str], tuple] = {}
     for each in sorted(found, key=lambda each: each[0]):
@@ -294,11 +299,7 @@ def _without_base(
         with_changes(run, [signature.changes[r] for signature in signatures])
         for r, run in enumerate(base_runs)
     ]
-    equations, k = normal_equations(runs), base_runs[0].slopes.shape[1]
-    hessian, gradient = equations.hessian, equations.gradient
-    cross = hessian[:k, k:]
-    solved = np.linalg.solve(hessian[:k, :k] + 1e-9 * np.eye(k), np.column_stack([cross, gradient[:k]]))
-    return hessian[k:, k:] - cross.T @ solved[:, :-1], gradient[k:] - cross.T @ solved[:, -1]
+    return _without_first(normal_equations(runs), base_runs[0].slopes.shape[1])[:2]
 
 
 def assess_separability(
