@@ -108,6 +108,9 @@ def verdicts(monitor: Monitor, log: Log, ends: Sequence[float]) -> list[Verdict]
         chance = probability_text(monitor.probability)
         text = f"The valve is as it was identified: the probability of a change is {chance}."
         found = [Verdict(status="good", text=text)]
+    elif not monitor.alarm:
+        text = f"The probability of a further change is {probability_text(monitor.probability)}."
+        found.append(Verdict(status="note", text=text))
     if monitor.restarts:
         text = f"Restarts because its state was not finite: {monitor.restarts}."
         found.append(Verdict(status="doubt", text=text))
@@ -166,11 +169,13 @@ def pictures(monitor: Monitor, log: Log, ends: Sequence[float]) -> list[Picture]
     named = range(0, len(ends), -(-len(ends) // NAMED_DRIVES))
     names = [Path(log.drives[k].file).stem for k in named]
     axes.set_xticks([(edges[k] + edges[k + 1]) / 2 for k in named], names, rotation=30, ha="right")
+    axes.axhline(50.0, color="0.4", linewidth=0.8, linestyle="--")
     axes.set(xlim=(0.0, ends[-1]), ylim=(0.0, 102.0))
     axes.set_ylabel("probability that the\nvalve has changed [%]")
     caption = (
-        "Probability that the valve has changed, over the drives; red: when a change began. Once an "
-        f"alarm has lasted for {SETTLING} openings, the changed valve becomes the reference and the "
-        "probability begins anew."
+        "Probability that the valve has changed, over the drives; red: when a change began. Two "
+        "openings in a row above the dashed line are an alarm. Once it has lasted for "
+        f"{SETTLING} openings, the changed valve becomes the reference, and the probability falls to 0; "
+        "a later rise is that of a further change."
     )
     return [Picture(figure=figure, caption=caption)]

@@ -188,7 +188,7 @@ def test_what_is_shipped_finds_a_change_and_its_return() -> None:
     assert [c.onset for c in monitor.changes] == pytest.approx([60.0, 120.0], abs=6.0)
     log: Any = SimpleNamespace(name="log", drives=[SimpleNamespace(file=f"d-{k}") for k in range(6)])
     ends = [30.0 * k for k in range(1, 7)]
-    changed, gone = (verdict.text for verdict in verdicts(monitor, log, ends))
+    changed, gone, *_ = (verdict.text for verdict in verdicts(monitor, log, ends))
     assert re.match(r"The valve has changed, since d-[12], \d+ s .*> 99 %\). The cause is eddy", changed)
     assert gone.startswith("The latest change is gone, since d-")
     assert len(pictures(monitor, log, ends)) == 1
