@@ -85,12 +85,15 @@ class FreeParameter:
     scale: float = math.nan
     """Usual size [SI], not 0; the optimiser works with value/scale. Left out: `usual_size`."""
     sd: float = math.inf
-    """Standard deviation of its Gaussian prior about `nominal` [SI]; infinity for none."""
+    """Standard deviation of its Gaussian prior [SI]; infinity for none."""
+    mean: float = math.nan
+    """Mean of that prior [SI]. Left out: `nominal`."""
 
     def __post_init__(self):
-        """Give a parameter without a scale its usual size, so that every scale is a number."""
-        if math.isnan(self.scale):
-            object.__setattr__(self, "scale", self.usual_size)
+        """Give a parameter without scale and mean its own, so that both are numbers."""
+        for name, own in (("scale", self.usual_size), ("mean", self.nominal)):
+            if math.isnan(getattr(self, name)):
+                object.__setattr__(self, name, own)
 
     @property
     def title(self) -> str:
