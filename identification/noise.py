@@ -1,15 +1,20 @@
-"""White noise and quantisation step of readings, as the readings themselves show them.
+"""Noise of readings, as the readings themselves show it: white, in steps, or correlated.
 
 White noise shows in differences of neighbouring readings (Rice 1984; second differences: Gasser, Sroka
 and Jennen-Steinmetz 1986), a smooth course hardly does. The median over blocks leaves out where it moves
 fast. Readings in coarse steps may not differ at all: then the step tells how far they may be off.
+Correlated noise shows in the autocovariance. A first-order process beside white noise, a ripple, is an
+ARMA(1, 1) process (Granger and Morris 1976), which a filter turns into white noise.
 """
 
+import math
 from collections.abc import Sequence
-from math import comb
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.signal import lfilter
+from scipy.stats import chi2
 
 BLOCK_READINGS = 20
 """Length of a block whose noise is estimated by itself [readings]: four blocks in a run of 80 readings,
@@ -42,6 +47,15 @@ ROBUST_ORDERS = (2, 4, 6)
 
 NORMAL = 1.4826
 """Standard deviation of a normal variable over the median of its magnitude [1]."""
+
+STEEPEST_DECAY = 2.0
+"""Largest ratio of autocovariances at successive readings [1]: what decays faster counts as white."""
+
+SEEN = 3.0
+"""Autocorrelation that is no chance, in standard deviations of that of white noise [1]."""
+
+LEAST = 1e-4
+"""Least floor [1], for recordings without noise: a hundredth of the noise that is stated."""
 
 
 def white_noise(series: Sequence[NDArray]) -> float:
@@ -113,7 +127,7 @@ def distances(series: Sequence[NDArray]) -> NDArray:
 
 def differences(readings: NDArray, order: int) -> NDArray:
     """Differences of readings (n,) with the standard deviation of their white noise, (n - order,)."""
-    return np.diff(readings, order) / np.sqrt(comb(2 * order, order))
+    return np.diff(readings, order) / np.sqrt(math.comb(2 * order, order))
 
 
 def _from_differences(series: Sequence[NDArray], order: int) -> float:
@@ -149,3 +163,139 @@ def _correlated_readings(order: int) -> float:
     weights = np.diff(np.eye(1, 2 * order + 1, order)[0], order)
     correlation = np.correlate(weights, weights, "full") / (weights @ weights)
     return float(np.sum(correlation**2))
+
+
+def is_white(residual: NDArray, length: int) -> bool:
+    """Whether block means scatter no more than independent samples of the same spread allow.
+
+    The spread is read off differences between neighbours, which slow courses hardly enter.
+
+    length: of a block [samples].
+    """
+    length = min(max(2, length), len(residual))
+    blocks = residual[: len(residual) // length * length].reshape(-1, length)
+    variance = np.mean(differences(residual, 1) ** 2)
+    statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
+    return bool(statistic <= variance * chi2.isf(1e-4, len(blocks)))
+
+
+def autocovariance(readings: Sequence[NDArray]) -> NDArray:
+    """Mean products of readings by lag [1], (lags,), pooled over runs; per run (readings,) [1]."""
+    longest = max(2, int(0.5 * max(len(own) for own in readings)))  # beyond, there are few pairs
+    total, count = np.zeros(longest + 1), np.zeros(longest + 1)
+    for own in readings:
+        size = 1 << int(np.ceil(np.log2(2 * len(own))))
+        spectrum = np.abs(np.fft.rfft(own, size)) ** 2
+        products = np.fft.irfft(spectrum, size)[: min(len(own), longest + 1)]
+        total[: len(products)] += products
+        count[: len(products)] += len(own) - np.arange(len(products))
+    return total / np.maximum(count, 1)
+
+
+def white_variance(covariance: NDArray) -> float:
+    """Variance of the white part [1]: what the first lags, continued to lag 0, do not reach.
+
+    A course that decays faster than STEEPEST_DECAY cannot be told from white noise.
+
+    covariance: by lag, (at least 3,) [1].
+    """
+    variance, first, second = (float(value) for value in covariance[:3])
+    if first <= 0:
+        return variance
+    ratio = min(max(first / second, 1.0), STEEPEST_DECAY) if second > 0 else STEEPEST_DECAY
+    return max(variance - ratio * first, 0.5 * max(variance - first, 0.0), LEAST)
+
+
+def correlated_readings(covariance: NDArray) -> float:
+    """Readings that tell as much as one independent reading [1], by their autocovariance (lags,).
+
+    1 + twice the sum of autocorrelations up to the first small one (Geyer 1992).
+    """
+    if covariance[0] <= 0:
+        return 1.0
+    correlation = covariance[1:] / covariance[0]
+    small = np.flatnonzero(correlation < 0.05)
+    kept = correlation[: small[0]] if len(small) else correlation
+    return float(1.0 + 2.0 * np.sum(kept))
+
+
+def faintly_correlated_readings(readings: Sequence[NDArray], mean_square: float) -> float:
+    """The same by means of blocks (Alexopoulos and Seila 1998): a faint correlation may last long [1].
+
+    Rounding to coarse steps leaves one: the same error as long as the reading does not move. The largest
+    of several lengths of block, each less its chance.
+    """
+    found, length = 1.0, BLOCK_READINGS
+    while mean_square > 0:
+        means = [float(np.mean(part)) for own in readings for part in _whole_blocks(own, length)]
+        if len(means) < 40:
+            break
+        chance = 1.0 + SEEN * np.sqrt(2.0 / len(means))
+        found = max(found, float(length * np.mean(np.square(means)) / (mean_square * chance)))
+        length *= 2
+    return found
+
+
+def _whole_blocks(readings: NDArray, length: int) -> list[NDArray]:
+    """Parts of readings of at least this length; none of fewer readings."""
+    return np.array_split(readings, len(readings) // length) if len(readings) >= length else []
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ripple:
+    """A first-order process beside white noise, as an ARMA(1, 1) process (Granger and Morris 1976)."""
+
+    decay: float
+    """Autocorrelation of the process at two successive samples [1]."""
+    memory: float
+    """Coefficient of the former innovation in a reading [1]."""
+    noise: float
+    """Standard deviation of the innovations, what no former reading predicts [noise deviations]."""
+    sd: float
+    """Standard deviation of the process [noise deviations]."""
+
+    @classmethod
+    def of(cls, variance: float, white: float, decay: float) -> "Ripple":
+        """A process and white noise of these variances [noise variances]."""
+        sides = variance * (1.0 - decay**2) + white * (1.0 + decay**2)
+        product = white * decay
+        half = 0.5 * sides
+        innovations = half + math.sqrt(max(half**2 - product**2, 0.0))
+        return cls(decay=decay, memory=product / innovations, noise=math.sqrt(innovations),
+                   sd=math.sqrt(variance))  # fmt: skip
+
+    @property
+    def samples(self) -> float:
+        """Samples over which the process is correlated."""
+        return -1.0 / math.log(self.decay)
+
+    def whitened(self, series: NDArray) -> NDArray:
+        """Innovations of series (samples, ...) that were 0 before, in standard deviations of theirs."""
+        return np.asarray(lfilter([1.0, -self.decay], [1.0, -self.memory], series / self.noise, axis=0))
+
+
+def ripple(readings: Sequence[NDArray], correlated: float, mean_square: float) -> Ripple | None:
+    """A first-order process in the quieter blocks that is as large in all of them; None for none.
+
+    Whether a model of the inputs could predict it is asked elsewhere.
+    """
+    # Ten correlated readings: the mean square of a block must not scatter much.
+    length = max(BLOCK_READINGS, round(10.0 * correlated))
+    blocks = [part for own in readings for part in _whole_blocks(own, length)]
+    blocks.sort(key=lambda part: float(np.mean(part**2)))
+    if len(blocks) < 8:
+        return None
+    quiet = blocks[: round(0.75 * len(blocks))]  # a wrong form is in the others
+    covariance = autocovariance(quiet)
+    chance = SEEN * covariance[0] / np.sqrt(sum(len(part) for part in quiet))
+    if covariance[1] < chance or covariance[0] < 0.6 * mean_square:
+        return None
+    small = np.flatnonzero(covariance[:-1] < max(chance, 0.2 * covariance[1]))
+    last = int(small[0]) if len(small) else len(covariance) - 1
+    early, late = covariance[1:last], covariance[2 : last + 1]
+    decay = float(np.clip(early @ late / (early @ early), 0.0, 0.999))
+    # What is fainter hardly moves the weights of the readings.
+    if decay < 1.0 / STEEPEST_DECAY or covariance[1] < 0.2 * covariance[0]:
+        return None
+    rippling = min(float(covariance[1]) / decay, float(covariance[0]))
+    return Ripple.of(rippling, float(covariance[0]) - rippling, decay)

@@ -15,7 +15,7 @@ from scipy.stats import chi2
 from epv_env.plant.parameters import Parameters
 from identification.calibration.calibrate import EXPLAINED
 from identification.calibration.problem import CalibrationProblem
-from identification.gap.prepare.noise import autocovariance
+from identification.noise import autocovariance
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.replay import (
     Response,

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from epv_env.plant.channels import Sensor
-from identification.readings_noise import quantisation_step, rounding_error
+from identification.noise import quantisation_step, rounding_error
 from identification.recordings.recording import UNITS
 from identification.recordings.recording_checks import longest_run
 

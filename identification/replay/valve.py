@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from epv_env.plant.parameters import Parameters
 from identification.gap.plant import Cause, Channel, FreeParameter, NuisanceParameter, Run, StateTrace
 from identification.gap.prepare.screened import Finding
-from identification.readings_noise import rounding_error
+from identification.noise import rounding_error
 from identification.recordings.recording import OUTPUTS, UNITS, Recording
 from identification.replay.equations import EQUATIONS, forced_changes, modelled, regimes, traces
 from identification.replay.model_inputs import model_inputs

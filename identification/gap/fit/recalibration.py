@@ -15,7 +15,7 @@ from identification.gap.fit.gauss_newton import fit, nuisance_slopes
 from identification.gap.plant import GreyBox
 from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio
 from identification.gap.prepare.prepared_plant import PreparedPlant, prepared
-from identification.readings_noise import white_noise
+from identification.noise import white_noise
 
 WRONG_NOISE_RATIO = 1.25
 """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
