@@ -16,13 +16,12 @@ from scipy.stats import norm
 from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.evidence import EvaluatedHypothesis, variance_inflation
 from identification.gap.fit.gaps import FLOOR
 from identification.gap.fit.laws import COMPONENTS, Law, in_words
 from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
 from identification.gap.judge.verdict import RankedCause
 from identification.gap.locate.localisation import Localisation, MissingTerm
-from identification.gap.search.posterior import variance_inflation
 
 GAP, TERM = "gap.json", "missing_term.json"
 FORMAT = "epv-gap/4"
