@@ -19,6 +19,7 @@ from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
 from epv_env.plant.supply import Supply
 from epv_env.signals import MovingTarget
+from training.evaluation.sensor_faults import Fault
 
 TUNING_REGION = "sensitive_ten_percent"
 """Plants tuned on: those that PPO trains on."""
@@ -37,6 +38,8 @@ class EvaluationScenario:
     """Of an episode [s]; None: as long as the comparison's others."""
     restart_s: float | None = None
     """When the control unit restarts, so that the controller forgets everything [s]; None: never."""
+    faults: tuple[Fault, ...] = ()
+    """Of the sensors that the controller reads, from `rollout.FAULT_S` on."""
 
 
 def consumption(like: str | None = None, **ranges: Any) -> Scenario:
@@ -145,7 +148,12 @@ BEYOND: dict[str, EvaluationScenario] = {
     # Training ends at 5.5 g/s.
     "8 g/s": _situation(scenario=consumption("steps", flow=(8.0, 8.0))),
     "restart": EvaluationScenario(restart_s=5.0),
-    "p3 frozen": _situation(conditions={"frozen_p3": 1.0, "frozen_p3_s": 2.0}),
+    **{
+        f"{channel} {fault}": EvaluationScenario(faults=((channel, fault),))
+        for channel in ("p1", "p3", "current")
+        for fault in ("stuck", "wild", "drifting")
+    },
+    "p1 and p3 swapped": EvaluationScenario(faults=(("p1", "swapped"), ("p3", "swapped"))),
     # Table 1 allows 1.6 % of 16 bar.
     "p2 biased": _situation(effects={"pressure_sensor_bias": {"b_p2": 25.6e3}}),
     "latency of 5 ms": _situation(effects={"command_delay": 5e-3}),

@@ -4,7 +4,6 @@ python -m docs.studies.rare.sensors    # writes sensors.csv and the table of REA
 """
 
 import sys
-from collections import deque
 from collections.abc import Sequence
 from itertools import combinations, product
 from pathlib import Path
@@ -19,13 +18,10 @@ from controllers.policy import load_policy
 from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.observation import HISTORY, LAYOUT, P2_LAGS, P3_LAGS, decode, encode
-from epv_env.plant.channels import CURRENT, P1, P2, P3
-from epv_env.result import DEVIATION
 from epv_env.reward import BAND_BAR
-from training.deploy.compiled import readings_of
-from training.evaluation.rollout import begin_episodes, make_env
+from training.evaluation.rollout import begin_episodes, make_env, run_begun
 from training.evaluation.seeds import RANGE, STATEMENT_SEED
+from training.evaluation.sensor_faults import CHANNELS, FAULTS, SensorFaults
 
 FOLDER = Path(__file__).parent
 EPISODES = 12
@@ -33,20 +29,18 @@ EPISODES = 12
 FIRST_SEED = STATEMENT_SEED + RANGE
 BEHIND = ("adaptive pulse", "extrapolating hysteresis")
 """Controllers whose sensors fail beside the policy's."""
-CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT}
-FAULTS = ("stuck", "zero", "saturated", "wild", "delayed")
-"""At its value; 0; at the sensor's end; uniform in its range in every period; late by DELAY periods."""
-DELAY = 20
+KINDS = FAULTS[:-1]
+"""Every fault of one sensor; swapped sensors are two."""
 BEGINS_S, DURATION_S = (1.0, 6.0), 8.0
 """When a fault begins, and how long an episode is [s]."""
-SINGLE = [(fault,) for fault in product(CHANNELS, FAULTS)]
+SINGLE = [(fault,) for fault in product(CHANNELS, KINDS)]
 PAIRS = [
-    pair for pair in combinations(product(CHANNELS, FAULTS), 2) if len({name for name, _ in pair}) == 2
+    pair for pair in combinations(product(CHANNELS, KINDS), 2) if len({name for name, _ in pair}) == 2
 ]
 
 
 def worst_excursions(controller: Controller, cases: list[Any], first_seed: int) -> NDArray:
-    """Largest |p2 - target| from the fault on, (cases,) [bar]; an episode for each case.
+    """Largest |p2 - target|, (cases,) [bar]; an episode for each case.
 
     cases: (channel, fault) pairs in each.
     """
@@ -54,43 +48,12 @@ def worst_excursions(controller: Controller, cases: list[Any], first_seed: int) 
     options = {"scenario": "mixed", "parameters": "sensitive_ten_percent", "threads": 1}
     env = make_env(controller, n, **options)
     seen = begin_episodes(env, controller, list(range(first_seed, first_seed + n)))
-    begins = rng.uniform(*BEGINS_S, n)
-    fault = np.full((n, len(CHANNELS)), -1)
-    for row, case in enumerate(cases):
-        for channel, name in case:
-            fault[row, list(CHANNELS).index(channel)] = FAULTS.index(name)
-    low, high = np.transpose([each.sensor.constants()[3:] for each in CHANNELS.values()])
-    true: deque[NDArray] = deque(maxlen=DELAY + 1)
-    stuck, worst, past = np.zeros(fault.shape), np.zeros(n), deque(maxlen=HISTORY)
     period = env.settings.control_period
-    for step in range(round(DURATION_S / period)):
-        now = readings_of(seen)
-        true.append(np.stack([now[name] for name in CHANNELS], axis=1))
-        acts = step * period >= begins
-        stuck = np.where(acts[:, None], stuck, true[-1])
-        wild = rng.uniform(low, high, fault.shape)
-        broken = np.stack([stuck, 0 * stuck, np.broadcast_to(high, fault.shape), wild, true[0]])
-        chosen = np.take_along_axis(broken, np.maximum(fault, 0)[None], axis=0)[0]
-        past.append(np.where((fault >= 0) & acts[:, None], chosen, true[-1]))
-        result = env.advance(controller.act(np.where(acts[:, None], _shown(past, seen, now), seen)))
-        seen = result.observation
-        worst = np.where(acts, np.maximum(worst, np.abs(result.figures[DEVIATION])), worst)
-        worst[result.failed] = np.inf
-    return worst
-
-
-def _shown(past: deque[NDArray], seen: NDArray, now: dict[str, NDArray]) -> NDArray:
-    """The observations (n, entries) that these readings give, the newest last."""
-    newest = dict(zip(CHANNELS, past[-1].T, strict=True))
-    values = {entry.name: decode(seen, entry.name) for entry in LAYOUT}
-    values |= {"p2_error": newest["p2"] - now["target"], "p1": newest["p1"], "p3": newest["p3"]}
-    values["I"] = newest["current"]
-    for name, lags in (("p2", P2_LAGS), ("p3", P3_LAGS)):
-        k = list(CHANNELS).index(name)
-        for lag in lags:
-            before = past[-1 - lag] if len(past) > lag else past[0]
-            values[f"{name}_change_{lag}"] = newest[name] - before[:, k]
-    return encode(values)
+    meters = run_begun(
+        env, controller, seen, periods=round(DURATION_S / period),
+        faults=SensorFaults(cases, rng.uniform(*BEGINS_S, n) / period, rng),
+    )  # fmt: skip
+    return np.where(meters["failed"] > 0, np.inf, meters["excursion"])
 
 
 def fault_table(controllers: dict[str, Controller], episodes: int, first_seed: int) -> pd.DataFrame:
