@@ -104,7 +104,7 @@ static float between(float low, float high)
     return low + (high - low) * (float)((seed >> 33) / 2147483648.0);
 }
 
-/* Random readings in a row, p1 and p3 as far as a valve allows, each lost once in 50; what must hold after
+/* Random readings in a row, p1 and p3 as a valve allows, each lost once in 50; what must hold after
  * each decision. */
 int main(void)
 {

@@ -108,6 +108,8 @@ def run_batches(
 
 def _placed(batch: Batch, controllers: Mapping[str, Controller]) -> Batch:
     """The batch on the processor if its controller decides nowhere else, or its sensors fail."""
+    if batch.device == "cpu":
+        return batch
     if not batch.faults and decides_on_device(controllers[batch.controller]):
         return batch
     return replace(batch, device="cpu")

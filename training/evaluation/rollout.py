@@ -18,8 +18,6 @@ from training.evaluation.sensor_faults import Fault, SensorFaults
 
 NEVER, NOTHING = -1, np.empty((0, 0, 0))
 """Instead of a period before which the control unit restarts, and of arrays."""
-FAULT_S = 2.0
-"""When the sensors of an episode fail [s]."""
 WARM_UP_DECISIONS = 50
 """Decisions whose time is not counted."""
 
@@ -85,7 +83,7 @@ def run_begun(
         if k == restart and not isinstance(controller, Privileged):
             controller.reset(len(meters))
         if faults is not None:
-            observation = faults.shown(observation, settings.control_period)
+            observation = faults.shown(observation)
         actions = controller.act(observation)
         result = env.advance(actions)
         observation = result.observation
@@ -114,14 +112,14 @@ def run_episodes(
         duration: of each episode [s].
         options: of the environment.
         restart_s: when the control unit restarts, and the plant goes on [s]; None: never.
-        faults: of the sensors that the controller reads, from FAULT_S on.
+        faults: of the sensors that the controller reads, from BEGINS_S on.
     """
     env = make_env(controller, len(seeds), **options)
     observation, period = begin_episodes(env, controller, seeds), env.settings.control_period
     restart = NEVER if restart_s is None else round(restart_s / period)
     periods = round(duration / period)
-    begins, rng = round(FAULT_S / period), np.random.default_rng(seeds[0])
-    failing = SensorFaults([faults] * len(seeds), begins, rng) if faults else None
+    rng = np.random.default_rng(seeds[0])
+    failing = SensorFaults(faults, len(seeds), period, rng) if faults else None
     meters = run_begun(env, controller, observation, periods=periods, restart=restart, faults=failing)
     return EpisodeMetrics.of(meters, period)
 

@@ -1,4 +1,5 @@
-"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, worn valves.
+"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, sensors that
+fail, worn valves.
 
     python -m docs.studies.comparison.study
 
@@ -8,7 +9,7 @@ What is finished is kept in runs/comparison and not run again.
 
 import shutil
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -17,7 +18,7 @@ from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, t
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.options import parse
 from training.commands import compare
-from training.evaluation.scenarios import BEYOND
+from training.evaluation.scenarios import BEYOND, SENSOR_FAULTS
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
@@ -30,7 +31,7 @@ CONTROLLERS = (
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""
-EPISODES, GROUPS, QUICK = 4096, {"beyond": 1024, "worn": 128}, 4
+EPISODES, GROUPS, QUICK = 4096, {"beyond": 1024, "faults": 1024, "worn": 128}, 4
 """Episodes in each plant set, in each scenario of a group, and under --quick."""
 PLANTS = "sensitive_ten_percent"
 """Plant set of the page's table and picture, and of the scenarios beyond training."""
@@ -69,7 +70,7 @@ def page_table(rows: pd.DataFrame) -> str:
     return table(headings, lines)
 
 
-def beyond_table(rows: pd.DataFrame) -> str:
+def beyond_table(rows: pd.DataFrame, scenarios: Iterable[str]) -> str:
     """Share that leaves [%]: a row for each scenario, a column for each controller. The policy's has its
     interval.
 
@@ -78,7 +79,7 @@ def beyond_table(rows: pd.DataFrame) -> str:
     forms = dict.fromkeys(BEYOND_CONTROLLERS, "{left_percent:.2g}") | {CONTROLLERS[0]: SHARE}
     cells = [forms[row["controller"]].format(**row) for row in rows.to_dict("records")]
     wide = rows.assign(cell=cells).pivot(index="scenario", columns="controller", values="cell")
-    lines = [[name, *wide.loc[name, list(BEYOND_CONTROLLERS)]] for name in BEYOND]
+    lines = [[name, *wide.loc[name, list(BEYOND_CONTROLLERS)]] for name in scenarios]
     return table(["scenario", *BEYOND_CONTROLLERS], lines)
 
 
@@ -100,7 +101,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows = pd.concat(beyond)
     rows[BEYOND_COLUMNS].to_csv(options.out / "beyond.csv", index=False, float_format="%.3g")
     blocks = {"controllers": page_table(pd.read_csv(work / "comparison.csv"))}
-    fill(options.out / PAGE, {**blocks, "beyond": beyond_table(rows)})
+    parts = {"beyond": beyond_table(rows, BEYOND)}
+    if not quick:
+        parts["faults"] = beyond_table(rows, SENSOR_FAULTS)
+    fill(options.out / PAGE, blocks | parts)
     if not quick:
         fill(ROOT / "README.md", blocks)
     return 0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import epv_env  # noqa: F401 - registers the environments
-from controllers.policy import load_policy
+from controllers.tuned import tuned
 from epv_env.common.units import GRAM
 from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
@@ -32,7 +32,9 @@ PLANT = Plant.calibrated()
 @pytest.fixture(scope="module")
 def healthy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logs") / "valve"
-    write_log(folder, load_policy(), PLANT, range(2), duration=10.0, scenario="service")
+    write_log(
+        folder, tuned("extrapolating hysteresis"), PLANT, range(2), duration=10.0, scenario="service"
+    )
     return folder
 
 
@@ -174,7 +176,14 @@ def test_cause_and_onset_are_found(tmp_path):
     eddy = {"eddy_current": {"G_eddy": 0.004}}
     folder = tmp_path / "log"
     write_log(
-        folder, load_policy(), PLANT, range(3), duration=20.0, scenario="steps", effects=eddy, onset=1
+        folder,
+        tuned("extrapolating hysteresis"),
+        PLANT,
+        range(3),
+        duration=20.0,
+        scenario="steps",
+        effects=eddy,
+        onset=1,
     )
     assert main(["gap", str(folder), "--logs", "--out", str(tmp_path / "out")]) == 0
     content = json.loads((tmp_path / "out" / "gap.json").read_text())
