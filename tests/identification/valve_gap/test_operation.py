@@ -47,7 +47,8 @@ def test_a_log_holds_what_the_controller_read(healthy):
     # The readings at a switching are still those of the coil before it.
     off = np.flatnonzero(np.diff(first.coil) < 0) + 1
     assert np.all(first.I[off] > 0.3)
-    assert np.all(first.I[off[off + 2 < len(first.I)] + 2] < 0.1)
+    later = off[off + 2 < len(first.I)] + 2
+    assert np.all(first.I[later[first.coil[later - 1] == 0]] < 0.1)
 
 
 def test_openings_begin_steady_and_know_the_leak(tmp_path):
