@@ -43,9 +43,9 @@ readings' difference with four times Table 3's noise."""
 STILL = 0.02
 """Change over four periods below which p3 stands still [bar]: twice the standard deviation that Table
 3's noise gives it. A chamber that fills or empties moves many times as much."""
-MARGIN = 0.5
+MARGIN = 0.4
 """Distance of p3 from the end that it goes to, within which it may stand still; most that it may lie
-above p1 [bar]. Table 1 allows each sensor 0.256."""
+above p1 [bar]. Table 1 allows each sensor 0.256, in squares 0.36 together."""
 FAR = 3.0
 """Distance from which one period shows whether p3 moves [bar]: it then moves by 0.15 bar or more."""
 AMBIENT = 1.0

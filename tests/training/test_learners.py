@@ -140,7 +140,7 @@ def test_seeds_are_ranked_by_violations_then_return_and_none_is_trained_twice(tm
 
     monkeypatch.setattr(selection, "train", as_trained)
     for seeds in ([1, 2], [1, 2, 3]):  # the first time it is stopped after two
-        table = train_seeds(TASK, tmp_path, seeds=seeds, subject={})
+        table = train_seeds(TASK, tmp_path, seeds=seeds)
     assert trained == [1, 2, 3]
     assert list(table["seed"]) == [3, 2, 1]
     assert list(pd.read_csv(tmp_path / selection.TABLE)["seed"]) == [3, 2, 1]

@@ -125,8 +125,7 @@ def trained(options: Options, task: "Task") -> list[dict[str, float]]:
         return train(task, options.out, seed=options.seed, resume=options.resume, **training)
     table = train_seeds(
         task, options.out, seeds=range(options.seed, options.seed + options.seeds),
-        subject=configuration(options, task.plant), **training,
-        **(QUICK_SELECTION if options.quick else {}),
+        **training, **(QUICK_SELECTION if options.quick else {}),
     )  # fmt: skip
     print(f"\n{table.to_string(index=False, float_format='{:.3g}'.format)}")
     best = seed_folder(options.out, table["seed"].iloc[0])

@@ -39,7 +39,7 @@ class SensorFaults:
         self._faults = [(list(CHANNELS).index(channel), kind) for channel, kind in faults]
         self._rng, self._step, self._left = rng, period, round(BEGINS_S / period)
         ends = [each.sensor.constants()[3:] for each in CHANNELS.values()]
-        self._low, self._high = np.transpose(ends)
+        self._low, self._high = np.array(ends).T
         drift = DRIFT * (self._high - self._low)
         self._drift = drift * rng.choice([-1.0, 1.0], (n, len(CHANNELS)))
         self._true: deque[NDArray] = deque(maxlen=DELAY + 1)

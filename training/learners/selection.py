@@ -13,6 +13,7 @@ import pandas as pd
 from controllers.policy import Policy, load_policy
 from controllers.policy_files import holds_policy, policy_digest
 from epv_env.common.files import Journal, write_text
+from epv_env.plant.plantfile import plant_subject
 from training.evaluation.batches import Batch, run_batches
 from training.evaluation.metrics import EpisodeMetrics, violation_interval
 from training.evaluation.seeds import SELECTION_SEED
@@ -29,8 +30,8 @@ def seed_folder(folder: Path, seed: int) -> Path:
 
 
 def train_seeds(
-    task: Task, folder: Path, *, seeds: Sequence[int], subject: dict[str, Any],
-    episodes: int = EPISODES, duration: float = 10.0, **training: Any,
+    task: Task, folder: Path, *, seeds: Sequence[int], episodes: int = EPISODES,
+    duration: float = 10.0, **training: Any,
 ) -> pd.DataFrame:  # fmt: skip
     """Train each seed in a folder of its own and validate it, but for what has been done already.
 
@@ -38,7 +39,6 @@ def train_seeds(
         task: what the policies are for.
         folder: of all seeds; the table is written into it after each.
         seeds: of the trainings.
-        subject: what the validations depend on beside the policies.
         episodes: of each validation.
         duration: of one of them [s].
         training: further arguments of `train`.
@@ -47,6 +47,8 @@ def train_seeds(
         A row for each seed, the best one first.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    about = {name: repr(value) for name, value in vars(task).items() if name != "plant"}
+    subject = {**plant_subject(task.plant), **about, "episodes": episodes, "duration": duration}
     journal, table = Journal(folder / JOURNAL, subject), pd.DataFrame()
     for seed in seeds:
         own = seed_folder(folder, seed)
