@@ -19,7 +19,7 @@ from epv_env.device.random import draw_normals, philox
 from epv_env.observation import LAYOUT
 from epv_env.period import begin_period, end_period, observe
 from epv_env.plant.equations import State
-from epv_env.plant.integrate import MAX_STEPS, NONE, STEPS, VALVE, WAITING, go_on
+from epv_env.plant.integrate import FORMS, MAX_STEPS, NONE, STEPS, VALVE, WAITING, go_on
 from epv_env.plant.lanes import EVENT, N_COEFFICIENT, N_EFFECT, N_INPUT, N_ROW, N_STATE, REMAINING
 from epv_env.plant.primitives import exact
 from epv_env.plant.runge_kutta import DEFAULT_STEP
@@ -41,12 +41,12 @@ INSTEAD, AFTER, KEEP = range(3)
 """What becomes of an episode that has ended, in the order of Gymnasium's AutoresetMode: the next one
 begins instead of the valve's next step, or after the step that ended it, or it runs on."""
 
-NUMBERS = ("state", "coefficients", "effects", "with_effects", "delay", "acting_U", "delay_left")
+NUMBERS = ("state", "coefficients", "effects", "kernel", "delay", "acting_U", "delay_left")
 """Arrays of `LimitingTask.memory` that are rows of one table here, in their order."""
 COEFFICIENTS = N_STATE
 EFFECTS = COEFFICIENTS + N_COEFFICIENT
-WITH_EFFECTS = EFFECTS + N_EFFECT
-DELAY_ON, DELAY_OFF, ACTING_U, DELAY_LEFT = range(WITH_EFFECTS + 1, WITH_EFFECTS + 5)
+KERNEL = EFFECTS + N_EFFECT
+DELAY_ON, DELAY_OFF, ACTING_U, DELAY_LEFT = range(KERNEL + 1, KERNEL + 5)
 P2, COIL_ENERGY = (State._fields.index(name) for name in ("p2", "coil_energy"))
 """Rows of the table, the state being the first ones."""
 ENTRIES = len(LAYOUT)
@@ -154,7 +154,7 @@ def delayed_parts(inputs, duration, numbers):
 @exact
 def integrate(numbers, inputs, duration, lowest, highest, work, queue, extended):
     """Advance a valve through the parts of its period. extended: as of `derivative`."""
-    state, effects = numbers[:N_STATE], numbers[EFFECTS:WITH_EFFECTS]
+    state, effects = numbers[:N_STATE], numbers[EFFECTS:KERNEL]
     queue[VALVE, 0], queue[WAITING, 0], queue[WAITING, 1], queue[STEPS, 0] = NONE, 0, 1, 0
     work[REMAINING, 0] = work[EVENT, 0] = 0.0
     while True:
@@ -170,11 +170,14 @@ def integrate(numbers, inputs, duration, lowest, highest, work, queue, extended)
 
 
 @cache
-def one_period(with_effects: bool) -> Any:
-    """The function that takes one control period of a valve (v, a Batch), which may have effects or not.
+def one_period(kernel: int) -> Any:
+    """The function that takes one control period of a valve (v, a Batch).
 
+    kernel: the greatest number of the valves' kernels (`registry.kernel_of`).
     noise (1, 1, 4) [-]; figures (N_FIGURE, 1) and observation (1, entries) are its results.
     """
+
+    extended = FORMS[kernel]
 
     @exact
     def take(v, rules, on_time, action, noise, figures, observation):
@@ -191,8 +194,8 @@ def one_period(with_effects: bool) -> Any:
                      asked, shown, figures, 0, 1)  # fmt: skip
         parts = delayed_parts(inputs, duration, v.numbers)
         inputs, duration = inputs[:parts], duration[:parts]
-        if with_effects and v.numbers[WITH_EFFECTS, 0] != 0.0:
-            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, True)
+        if kernel > 0 and v.numbers[KERNEL, 0] != 0.0:
+            integrate(v.numbers, inputs, duration, lowest, highest, work, queue, extended)
         else:
             integrate(v.numbers, inputs, duration, lowest, highest, work, queue, None)
         end_period(v.episodes, rules, noise, state, before, lowest, highest, v.sensors, figures,
@@ -217,12 +220,12 @@ def begin_episode(b, starts, r, i):
 
 
 @cache
-def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
-    """The kernel that takes one control period of all valves; some may have effects, or none.
+def step_kernel(rule: Callable[..., Any], kernel: int) -> Any:
+    """The kernel that takes one control period of all valves.
 
-    rule: of one action (actions.py). ending: INSTEAD, AFTER or KEEP.
+    rule: of one action (actions.py). kernel: as of `one_period`. ending: INSTEAD, AFTER or KEEP.
     """
-    take = one_period(with_effects)
+    take = one_period(kernel)
 
     @cuda.jit
     def step(b, starts, r, rules, actions, slots, limits, ending):
@@ -255,7 +258,7 @@ def step_kernel(rule: Callable[..., Any], with_effects: bool) -> Any:
 
 @cache
 def episodes_kernel(
-    decide: Callable[..., Any], memory: np.dtype, count: Callable[..., Any], with_effects: bool
+    decide: Callable[..., Any], memory: np.dtype, count: Callable[..., Any], kernel: int
 ) -> Any:
     """The kernel that runs whole episodes of the on/off environment under a controller.
 
@@ -263,9 +266,9 @@ def episodes_kernel(
     follows from the episode's key, so lanes do not matter.
 
     decide: of a controller of one valve, with its memory's record (controllers/base.py). count: of an
-    episode's period (training/evaluation/metrics.py). with_effects: whether some valves have effects.
+    episode's period (training/evaluation/metrics.py). kernel: as of `one_period`.
     """
-    take = one_period(with_effects)
+    take = one_period(kernel)
 
     @cuda.jit
     def run(b, rules, constants, blank, noise, periods, restart, queue, meters, record):

@@ -82,7 +82,7 @@ class _DeviceVectorEnv(_ValveVectorEnv):
                 self._rngs[i] = np_random(each)[0]
         self._begin(np.arange(self.task.n), options)
         starts = kernels.Batch.of(self.task)
-        self._with_effects = bool(np.any(starts.numbers[kernels.WITH_EFFECTS]))
+        self._kernel = int(np.max(starts.numbers[kernels.KERNEL]))
         self._starts = on_device(starts)
         shapes = [(*each.shape[:-1], self.num_envs) for each in starts]
         blanks = map(cuda.device_array, shapes, [each.dtype for each in starts])
@@ -100,7 +100,7 @@ class _DeviceVectorEnv(_ValveVectorEnv):
         return r.observation, r.reward, r.terminated, r.truncated, infos
 
     def _launch(self, actions: Any, ending: int) -> None:
-        kernel = kernels.step_kernel(self.action_form.rule, self._with_effects)
+        kernel = kernels.step_kernel(self.action_form.rule, self._kernel)
         kernels.launch(
             kernel, self.num_envs, self._batch, self._starts, self._results, self._rules, actions,
             self.action.slots, self._limits, ending,

@@ -39,7 +39,6 @@ def folded(p: Mapping[str, Value], reservoir_volume: Value) -> Coefficients:
         xMV0=p["xMV0"],
         kMV=p["kMV"],
         xMVmax=p["xMVmax"],
-        eMV=p["eMV"],
         mMV_inverse=1 / p["mMV"],
         curtain_in=p["alphaMV"] * np.pi * p["dMVin"],
         orifice_in=p["alphaMV"] * QUARTER_PI * p["dMVin"] ** 2,

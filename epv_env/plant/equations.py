@@ -13,7 +13,7 @@ from typing import NamedTuple
 from epv_env.plant.effects.chambers import chamber_rates, pipe_rate
 from epv_env.plant.effects.coil import coil_current, flux_rate, heated, heating_rate
 from epv_env.plant.effects.flows import discharge, effective_seat_diameter, supply_drop_rate
-from epv_env.plant.effects.magnet import saturated_force, saturation_level
+from epv_env.plant.effects.magnet import saturated_force, saturation_level, steepness
 from epv_env.plant.effects.measurement import lag_rate
 from epv_env.plant.effects.movers import (
     SLIDING_SPEED_MV,
@@ -127,8 +127,6 @@ class Coefficients(NamedTuple):
     """Damping of the armature [N s/m]."""
     xMVmax: Value
     """Stroke of the armature [m]."""
-    eMV: Value
-    """Coefficient of restitution of the armature's stops [-]."""
     mMV_inverse: Value
     """1/mMV [1/kg]."""
     curtain_in: Value
@@ -214,7 +212,7 @@ def armature_force(q, c, inverse_Rm, effects, extended):
     current, half = q.I, 0.5
     if extended is not None:
         current = q.I + effects.I_rem
-        half = saturated_force(saturation_level(current, inverse_Rm, effects.force_saturation))
+        half = saturated_force(saturation_level(current, inverse_Rm, effects.saturation))
     flux_linkage = current * inverse_Rm
     magnetic = half * c.N_squared * flux_linkage * flux_linkage * c.gap_reluctance
     force = magnetic - c.cMV * (q.xMV + c.xMV0) - c.kMV * q.vMV
@@ -227,15 +225,17 @@ def armature_force(q, c, inverse_Rm, effects, extended):
 @inlined
 def current_rate(q, u, c, inverse_Rm, effects, extended):
     """dI/dt [A/s] (eq. 12 with the sign of docs/explanation/plant-model.md, correction 6)."""
-    current, per_inductance = q.I, c.N_squared_inverse * reluctance(q, c)
+    current, per_inductance, saturated = q.I, c.N_squared_inverse * reluctance(q, c), 1.0
     if extended is not None:
         current = q.I + effects.I_rem
-        flattened = 1.0 + saturation_level(current, inverse_Rm, effects.saturation)
-        per_inductance *= flattened * flattened
+        level = saturation_level(current, inverse_Rm, effects.saturation)
+        steep = steepness(level, effects.saturation_knee)
+        per_inductance *= steep
+        saturated = steep / steepness(level, 0.0)  # the armature's EMF belongs to its force
         linkage_rate = flux_rate(u.U, q.I, heated(c.R, q.coil_heat), effects)
     else:
         linkage_rate = u.U - c.R * q.I
-    motion = current * q.vMV * c.gap_reluctance * inverse_Rm
+    motion = current * q.vMV * c.gap_reluctance * inverse_Rm * saturated
     return linkage_rate * per_inductance - motion
 
 
@@ -332,15 +332,15 @@ def derivative(q, u, c, effects, free_PV, free_MV, extended):
 
     These forces include the friction of a mover at rest on a stop; a mover that is let go has none yet.
 
-    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: True, or None,
-    for which numba drops the effects before it types them. Returns (State of rates, piston force,
-    armature force).
+    free_PV, free_MV: 1.0 where the mover may move, 0.0 where a stop holds it. extended: None, for
+    which numba drops the effects before it types them; FEW_LAWS where no other laws are in use; or
+    True. Returns (State of rates, piston force, armature force).
     """
     feed_MV = q
     if extended is not None:
         feed_MV = _with_supply(q, q.p1 - effects.supply_MV * q.supply_drop)
         q = _with_supply(q, q.p1 - effects.supply_PV * q.supply_drop)
-        effects = with_laws(q, effects)
+        effects = with_laws(q, effects, extended)
     force_PV = piston_force(q, c, effects, extended)
     inverse_Rm = reluctance_inverse(q, c)
     force_MV = armature_force(feed_MV, c, inverse_Rm, effects, extended)

@@ -11,6 +11,7 @@ sixteen; so its trajectory does not depend, to the bit, on its companions or on 
 import numba
 import numpy as np
 
+from epv_env.plant.effects.registry import FEW_LAWS
 from epv_env.plant.lanes import (
     COEFFICIENT,
     EFFECT,
@@ -109,7 +110,7 @@ def go_on(work, lane, queue, state, coefficients, effects, inputs, duration, low
 @inlined
 def _run(state, coefficients, effects, inputs, duration, lowest, highest, record, step, first, last,
          extended):  # fmt: skip
-    """Body of `run_nominal` and `run_extended`."""
+    """Body of the KERNELS."""
     wide_vectors()
     work, queue = new_workspace(), new_queue(first, last)
     work[REMAINING] = work[EVENT] = 0.0
@@ -144,7 +145,14 @@ def _compile(extended, digest):
     return run
 
 
-run_nominal = _compile(None, _DIGEST)
+FORMS = (None, FEW_LAWS, True)
+"""`extended` of `derivative`, by the kernel's number (`registry.kernel_of`)."""
+
+KERNELS = tuple(_compile(form, _DIGEST) for form in FORMS)
+"""Without effects; with all effects of effects/; with more laws of theirs, too. `run_nominal` has the
+arguments of each, which is compiled when it is first called."""
+
+run_nominal = KERNELS[0]
 """Advance lanes first..last of a batch through one or more periods, in place.
 
 state [N_STATE, lanes], coefficients, effects; inputs [period, N_INPUT, lanes]; duration [period, lanes]
@@ -152,6 +160,3 @@ in s; lowest, highest [lanes]: running extremes of p2 in Pa; record [period, N_S
 state after each period, or nothing if it is empty; step: largest step [s]. All C-contiguous float64,
 first and last multiples of LANES. A lane that cannot be integrated becomes NaN.
 """
-
-run_extended = _compile(True, _DIGEST)
-"""`run_nominal` with every effect of effects.py compiled in."""

@@ -119,6 +119,9 @@ LANDING = 1e-8
 STICK_SPEED = 5e-3
 """A rebound slower than this ends at the stop [m/s]: with restitution, rebounds would never end."""
 
+MOST_RESTITUTION = 0.95
+"""Greatest restitution to which a law may raise that of the armature [-]."""
+
 RELEASE_MARGIN = 1e-7
 """Time by which a located release is overstepped, so that the next step finds the mover free [s]."""
 
@@ -243,11 +246,12 @@ def _stepper(lanes):
             refused = event | wrong
 
             xPV, vPV = _landed(end.xPV, end.vPV, c.xPVmax, c.ePV)
-            xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, c.eMV)
-            current = end.I
+            current, restitution_MV = end.I, 0.0
             if extended is not None:
-                acting = with_laws(end, effects)
+                acting = with_laws(end, effects, extended)
+                restitution_MV = min(acting.restitution_MV, MOST_RESTITUTION)
                 current = coil_current(u.U, end.I, c.R, end.coil_heat, acting)
+            xMV, vMV = _landed(end.xMV, end.vMV, c.xMVmax, restitution_MV)
             landed = _with_landing(end, xPV, vPV, xMV, vMV, current)
             reached = chosen_state(refused, q, landed)
             if extended is not None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -18,7 +18,7 @@ from epv_env.plant.channels import SENSOR_SYMBOLS
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.coil import OFF_VOLTAGE
 from epv_env.plant.effects.measurement import command_delays
-from epv_env.plant.effects.registry import effect_constants, has_effects
+from epv_env.plant.effects.registry import effect_constants, kernel_of
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.lanes import LANES, N_INPUT, N_STATE
 from epv_env.plant.parameters import Parameters
@@ -174,7 +174,7 @@ class Valves:
         self._inputs = np.zeros((N_INPUT, lanes))
         self._duration = np.zeros(lanes)
         self._no_record = np.empty((0, N_STATE, lanes))
-        self._with_effects = np.zeros(lanes, dtype=bool)
+        self._kernel = np.zeros(lanes, dtype=int)
         self._delay = np.zeros((2, lanes))
         self._acting_U = np.full(lanes, np.nan)
         self._delay_left = np.zeros(lanes)
@@ -202,12 +202,12 @@ class Valves:
 
         Copy them, or fill them and call `settle`.
         """
-        names = ("with_effects", "delay", "acting_U", "delay_left")
+        names = ("kernel", "delay", "acting_U", "delay_left")
         return {**self.tables._asdict(), **{name: getattr(self, f"_{name}") for name in names}}
 
     def settle(self) -> None:
         """Take note of what `memory` holds now."""
-        self.nominal = not (np.any(self._with_effects) or np.any(self._delay))
+        self.nominal = not (np.any(self._kernel) or np.any(self._delay))
 
     @property
     def state(self) -> State:
@@ -230,7 +230,7 @@ class Valves:
         self.tables.coefficients[:, where] = coefficients(p, reservoir_volume)
         constants = effect_constants(p)
         self.tables.effects[:, where] = constants
-        self._with_effects[where] = has_effects(constants)
+        self._kernel[where] = kernel_of(constants)
         self._delay[0, where], self._delay[1, where] = command_delays(p)
         self._acting_U[where] = np.nan
         for symbol in SENSOR_SYMBOLS:
@@ -276,24 +276,20 @@ class Valves:
         return State(*(out[PARTS - 1 :: PARTS] if delayed else out)[:, :, : self.n].transpose(1, 0, 2))
 
     def _run(self, inputs: NDArray, duration: NDArray, out: NDArray) -> None:
-        """Run both kernels if valves with and without effects are mixed, each on its own valves.
+        """Run each kernel on the valves that need it.
 
         So a valve's trajectory does not depend, to the bit, on its companions' effects.
         """
-        forced = Inputs(*np.any(inputs, axis=0))
-        with_effects = self._with_effects | forced.air_3 | forced.force_PV | forced.force_MV
-        if not np.any(with_effects):
-            self._run_with(integrate.run_nominal, inputs, duration, out)
+        forced: Any = Inputs(*np.any(inputs, axis=0))
+        kernel = np.maximum(self._kernel, forced.air_3 | forced.force_PV | forced.force_MV)
+        needed = set(kernel[: self.n].tolist())
+        if len(needed) == 1:
+            self._run_with(integrate.KERNELS[needed.pop()], inputs, duration, out)
             return
-        if np.all(with_effects[: self.n]):
-            self._run_with(integrate.run_extended, inputs, duration, out)
-            return
-        nominal = np.where(with_effects, 0.0, duration)
-        extended = np.where(with_effects, duration, 0.0)
-        self._run_with(integrate.run_nominal, inputs, nominal, out)
-        others = np.empty_like(out)
-        self._run_with(integrate.run_extended, inputs, extended, others)
-        out[:, :, with_effects] = others[:, :, with_effects]
+        for number in needed:
+            own, part = kernel == number, np.empty_like(out)
+            self._run_with(integrate.KERNELS[number], inputs, np.where(own, duration, 0.0), part)
+            out[:, :, own] = part[:, :, own]
 
     def _run_with(
         self, run: Callable[..., None], inputs: NDArray, duration: NDArray, out: NDArray

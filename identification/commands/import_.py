@@ -18,6 +18,7 @@ from identification.importing.import_campaign import (
     read_source,
     source_table,
 )
+from identification.importing.mapping_file import MappingFile, read_mapping
 from identification.recordings.campaign_files import check_campaign, check_vacant, write_campaign
 from identification.recordings.recording import rules_of
 
@@ -48,11 +49,14 @@ class Options:
 def run(options: Options) -> None:
     """Show what the files hold and write the campaign. Raises ImportingError or CampaignError."""
     check_vacant(options.out)
+    mapping = read_mapping(options.mapping) if options.mapping else MappingFile()
+    sources = []
     for file in options.files:
-        print(source_table(read_source(file)), end="\n\n")
+        sources.append(read_source(file, mapping.missing))
+        print(source_table(sources[-1]), end="\n\n")
     imported = read_files(
-        options.files,
-        mapping=options.mapping,
+        sources,
+        mapping=mapping,
         ambient_bar=options.ambient_bar,
         temperature_K=options.temperature_K,
         rate=options.rate,
@@ -62,10 +66,12 @@ def run(options: Options) -> None:
     )
     print(import_text(imported), end="\n\n")
     if options.dry_run:
-        check_campaign(imported.campaign, options.out)
+        check_campaign(imported.campaign, options.out, imported.places)
         print("dry run: all checks passed, nothing is written; leave --dry-run out to import")
         return
-    write_campaign(imported.campaign, options.out, provenance=imported.provenance())
+    write_campaign(
+        imported.campaign, options.out, provenance=imported.provenance(), places=imported.places
+    )
     print(f"{len(imported.files)} recordings in {options.out}")
 
 

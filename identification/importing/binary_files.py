@@ -1,9 +1,8 @@
 """Measurement files of MDF, TDMS, Parquet and MATLAB, read by the packages of their formats."""
 
-import struct
-import zlib
+import math
 from collections.abc import Iterator, Mapping
-from decimal import Decimal
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,11 @@ import scipy.io
 from numpy.typing import NDArray
 
 from identification.importing import times
-from identification.importing.mapping_file import meaning
+from identification.importing.cells import Columns
 from identification.importing.source_file import (
+    NO_NUMBERS,
     SourceChannel,
-    check_number,
     check_unpacked,
-    limited,
     needed_package,
     unread,
 )
@@ -33,8 +31,7 @@ def read_mdf(path: Path) -> tuple[str, list[SourceChannel]]:
     with asammdf.MDF(path) as mdf:
         numbers = sum(group.channel_group.cycles_nr * len(group.channels) for group in mdf.groups)
         check_unpacked(path, numbers * NUMBER)
-        channels = (_mdf_channel(mdf, signal) for signal in mdf.iter_channels(skip_master=True))
-        return f"MDF {mdf.version}", limited(path, channels)
+        return f"MDF {mdf.version}", [_mdf_channel(mdf, s) for s in mdf.iter_channels(skip_master=True)]
 
 
 NUMBER = 8
@@ -42,7 +39,6 @@ NUMBER = 8
 
 MDF_SIGNATURES = (b"MDF", b"UnF")
 """First bytes of MDF, and of MDF that its writer did not finish."""
-
 
 ALL_INVALID = 1
 """Flag of an MDF 4 channel of which no reading counts; asammdf leaves it to its callers."""
@@ -53,7 +49,7 @@ def _mdf_channel(mdf: Any, signal: Any) -> SourceChannel:
     table = f"group {signal.group_index}"
     samples = np.asarray(signal.samples)
     if samples.ndim != 1 or samples.dtype.kind not in "iufb":
-        return unread(signal.name, table)
+        return unread(signal.name, NO_NUMBERS, table)
     channel = mdf.groups[signal.group_index].channels[signal.channel_index]
     bits = False if signal.invalidation_bits is None else np.asarray(signal.invalidation_bits)
     invalid = bits | bool(getattr(channel, "flags", 0) & ALL_INVALID)
@@ -74,19 +70,18 @@ def read_tdms(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric channel; waveforms bring their own times."""
     nptdms = needed_package("nptdms", "TDMS files")
     with nptdms.TdmsFile.open(path) as file:
-        channels = (
+        return "TDMS", [
             _tdms_channel(group.name, channel)
             for group in file.groups()
             for channel in group.channels()
             if len(channel) > 1
-        )
-        return "TDMS", limited(path, channels)
+        ]
 
 
 def _tdms_channel(group: str, channel: Any) -> SourceChannel:
     """A waveform with its times and their begin, or a channel whose times are another channel."""
     if channel.dtype.kind not in "iufM":
-        return unread(channel.name, group)
+        return unread(channel.name, NO_NUMBERS, group)
     values, begin = times.seconds(np.asarray(channel[:]))
     properties = channel.properties
     time = _waveform_times(properties, len(values))
@@ -114,26 +109,17 @@ def read_parquet(path: Path) -> tuple[str, list[SourceChannel]]:
     """Every numeric column, NaN where it is null; its unit is the field's metadata `unit`, if any."""
     parquet = needed_package("pyarrow.parquet", "Parquet files")
     found = parquet.read_metadata(path)
-    check_number(path, found.num_columns)
     check_unpacked(path, found.num_rows * found.num_columns * NUMBER)
-    return "Parquet", limited(path, _parquet_channels(path, parquet.read_table(path)))
-
-
-def _parquet_channels(path: Path, table: Any) -> Iterator[SourceChannel]:
-    for field in table.schema:
-        values = table.column(field.name).to_numpy()
-        first = next((value for value in values if value is not None), None)
-        if isinstance(first, Decimal):
-            values = values.astype(float)
-        elif isinstance(first, str) and times.is_point(first):
-            values = times.points_in_time(f"{path}, {field.name}", values)
-        if values.dtype.kind not in "iufMm":
-            yield unread(field.name)
-        else:
-            unit = (field.metadata or {}).get(b"unit", b"").decode("utf-8", "replace")
-            unit = "s" if values.dtype.kind in "Mm" else unit
-            numbers, begin = times.seconds(values)
-            yield SourceChannel(name=field.name, unit=unit, values=numbers, begin=begin)
+    table = parquet.read_table(path)
+    told = [field.metadata or {} for field in table.schema]
+    columns = Columns(
+        frame=table.to_pandas(ignore_metadata=True).set_axis(range(table.num_columns), axis="columns"),
+        lines=np.arange(1, table.num_rows + 1),
+        decimal=".",
+        names=table.column_names,
+        units=[metadata.get(b"unit", b"").decode("utf-8", "replace") for metadata in told],
+    )
+    return "Parquet", [replace(channel, lines=None) for channel in columns.channels()]
 
 
 HDF5_SIGNATURE = b"\x89HDF"
@@ -142,9 +128,6 @@ HDF5_SIGNATURE = b"\x89HDF"
 VALUE_FIELDS, TIME_FIELDS, UNIT_FIELDS = ("data", "values", "value"), ("time", "t"), ("unit", "units")
 NAME_FIELDS = ("label", "name")
 """Fields of a struct that holds one channel; the name counts in an array of such structs."""
-
-TIME_UNIT_FIELDS = ("time_unit", "t_unit", "timeunit", "time_units")
-"""Fields of such a struct that hold the unit of its times."""
 
 START_FIELDS, INTERVAL_FIELDS = ("tstart", "t0", "start"), ("tinterval", "interval", "dt", "ts")
 """Numbers that stand for the times of the vectors beside them [s]."""
@@ -160,25 +143,10 @@ def read_matlab(path: Path) -> tuple[str, list[SourceChannel]]:
     if HDF5_SIGNATURE in (head[:4], head[512:516]):
         check_unpacked(path, _hdf5_size(path))
         content = needed_package("pymatreader", "MATLAB 7.3 files").read_mat(str(path))
-        version = "MATLAB 7.3"
-    else:
-        check_unpacked(path, _matlab_size(path))
-        content = scipy.io.loadmat(path, simplify_cells=True)
-        version = "MATLAB 5"
-    return version, limited(path, _matlab_channels("", content))
-
-
-def _matlab_size(path: Path) -> int:
-    """Bytes to which the compressed variables of a MATLAB 5 file say that they unpack."""
-    content, at, unpacked = path.read_bytes(), 128, 0
-    order = {b"IM": "<", b"MI": ">"}.get(content[126:128])
-    while order and at + 8 <= len(content):
-        kind, size = struct.unpack_from(f"{order}II", content, at)
-        if kind == COMPRESSED:
-            begin = zlib.decompressobj().decompress(content[at + 8 : at + 8 + size], 8)
-            unpacked += struct.unpack(f"{order}II", begin)[1]
-        at += 8 + size
-    return unpacked
+        return "MATLAB 7.3", list(_matlab_channels("", content))
+    shapes = [shape for _, shape, _ in scipy.io.whosmat(path)]
+    check_unpacked(path, NUMBER * sum(map(math.prod, shapes)))
+    return "MATLAB 5", list(_matlab_channels("", scipy.io.loadmat(path, simplify_cells=True)))
 
 
 def _hdf5_size(path: Path) -> int:
@@ -189,26 +157,16 @@ def _hdf5_size(path: Path) -> int:
     return sum(sizes)
 
 
-COMPRESSED = 15
-"""Type of a compressed variable; within it stand its own type and its size."""
-
-
 def _matlab_channels(path: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
     """The channels of a struct, and of the structs in it."""
     units = _first(content, UNIT_FIELDS)
     units = units if isinstance(units, Mapping) else {}
-    channels = [
-        channel
-        for name, value in content.items()
-        if not name.startswith(("__", "#"))  # HDF5 keeps MATLAB's objects behind a #
-        for channel in _matlab_field(path, f"{path}.{name}" if path else name, value, units.get(name))
-    ]
-    yield from channels
-    steady = _times_of_interval(content)
-    if steady is not None and not any(
-        meaning(channel.name, channel.unit) == "time" for channel in channels
-    ):
-        yield from _matlab_columns(f"{path}.time" if path else "time", steady, "s", path)
+    for name, value in content.items():
+        if not name.startswith(("__", "#")):  # HDF5 keeps MATLAB's objects behind a #
+            full = f"{path}.{name}" if path else name
+            yield from _matlab_field(path, full, value, units.get(name))
+    if _first(content, TIME_FIELDS) is None and (steady := _times_of_interval(content)) is not None:
+        yield from _matlab_columns(path, f"{path}.time" if path else "time", steady, "s")
 
 
 def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[SourceChannel]:
@@ -226,7 +184,7 @@ def _matlab_field(path: str, full: str, value: Any, unit: Any) -> Iterator[Sourc
             named = isinstance(one, Mapping) and _first(one, NAME_FIELDS)
             yield from _matlab_field(path, str(named or f"{full}({number})"), one, "")
     elif isinstance(value, np.ndarray):
-        yield from _matlab_columns(full, value, unit, path)
+        yield from _matlab_columns(path, full, value, unit)
 
 
 def _struct_array(name: str, struct: Mapping[str, Any]) -> Any:
@@ -237,21 +195,20 @@ def _struct_array(name: str, struct: Mapping[str, Any]) -> Any:
     return [struct] if name.endswith("signals") else struct
 
 
-def _matlab_columns(name: str, value: NDArray, unit: Any, path: str) -> Iterator[SourceChannel]:
+def _matlab_columns(path: str, name: str, value: NDArray, unit: Any) -> Iterator[SourceChannel]:
     """The vectors of a numeric array: its columns, or its rows where these are longer."""
-    unit = unit if isinstance(unit, str) else ""
     if type(value).__name__ in OBJECTS:
-        yield unread(name, path, "a MATLAB object such as a timeseries: save its numbers as vectors")
+        yield unread(name, "is a MATLAB object: save its numbers as vectors", path)
     value = np.squeeze(value)
     if value.dtype.kind == "c":
-        yield unread(name, path, "complex numbers: save their real part")
+        yield unread(name, "holds complex numbers: save their real part", path)
     if value.dtype.kind not in "iufb" or value.ndim not in (1, 2) or value.shape[0] < 2:
         return
     rows = np.atleast_2d(value if value.ndim == 1 or value.shape[0] < value.shape[1] else value.T)
     for number, row in enumerate(rows, start=1):
         yield SourceChannel(
             name=name if len(rows) == 1 else f"{name}({number})",
-            unit=unit,
+            unit=unit if isinstance(unit, str) else "",
             values=np.asarray(row, dtype=float),
             table=path,
         )
@@ -259,14 +216,13 @@ def _matlab_columns(name: str, value: NDArray, unit: Any, path: str) -> Iterator
 
 def _single(path: str, name: str, content: Mapping[str, Any]) -> Iterator[SourceChannel]:
     """A struct that holds one channel, perhaps with its own time."""
-    unit, time = _first(content, UNIT_FIELDS), _first(content, TIME_FIELDS)
-    if time is None:
-        time = _times_of_interval(content)
+    time = _first(content, TIME_FIELDS)
+    time = _times_of_interval(content) if time is None else np.asarray(time)
     table = path if time is None else name
-    yield from _matlab_columns(name, np.asarray(_first(content, VALUE_FIELDS)), unit, table)
+    values = np.asarray(_first(content, VALUE_FIELDS))
+    yield from _matlab_columns(table, name, values, _first(content, UNIT_FIELDS))
     if time is not None:
-        time_unit = _first(content, TIME_UNIT_FIELDS)
-        yield from _matlab_columns(f"{name}.time", np.asarray(time), time_unit, table)
+        yield from _matlab_columns(table, f"{name}.time", time, "")
 
 
 def _times_of_interval(content: Mapping[str, Any]) -> NDArray | None:

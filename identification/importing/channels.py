@@ -1,6 +1,6 @@
 """Which channel of a file is which of a recording, its times and its values in SI units."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,40 +19,37 @@ from identification.importing.mapping_file import (
     split_name,
 )
 from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
-from identification.importing.times import begin_offsets, in_order
-from identification.importing.units import PhysicalUnit, needed_unit, parsed_unit
+from identification.importing.units import EXAMPLES, PhysicalUnit, needed_unit, parsed_unit
 from identification.recordings.recording import CHANNELS
 
 LONGEST_GAP = 5e-3
 """Longest stretch of missing readings that is filled [s]: shorter than any move of valve or pressure."""
 
-COMMANDS = ("U", "sigma_S")
-"""Channels that may be logged on change only, and that hold their value where a reading is missing."""
+SHORTEST_STEP = 1e-6
+"""Least step of times whose unit nobody tells [s]: a spreadsheet's days have less."""
 
 
 def clock_of(
-    source: SourceFile, mapping: MappingFile, channel: SourceChannel, named: str | None
+    source: SourceFile, mapping: MappingFile, channel: SourceChannel
 ) -> tuple[NDArray, np.datetime64 | None]:
     """Times of a channel's samples, (samples,) [s] or NaN, and the point in time of 0 s.
 
-    Raises ImportingError if none or several can be meant.
-    named: the channel of times that the mapping file gives for this one; None: it gives none.
+    Those of the channel that the mapping file names for all, or that is called a time, in the nearest
+    table. Raises ImportingError if none or several can be meant.
     """
-    if named is not None:
-        return _read(source, mapping, named_channel(source, named))
     if channel.time is not None:
-        return in_order(channel.time), channel.begin
-    named = mapping.channels.get("time", ChannelEntry()).source
-    table: str | None = channel.table
-    while table is not None:
-        clocks = [
-            other
-            for other in source.channels
-            if other.table == table
-            and other is not channel
-            and len(other.values) == len(channel.values)
-            and (_is_called(other, named) if named else _holds_times(other))
-        ]
+        return channel.time, channel.begin
+    named = mapping.entry("time").source
+    called = [
+        other
+        for other in source.channels
+        if other is not channel
+        and other.file == channel.file
+        and (_is_called(other, named) if named else holds_times(other))
+    ]
+    parts = channel.table.split(".")
+    for table in (".".join(parts[:depth]) for depth in range(len(parts), -1, -1)):
+        clocks = [c for c in called if c.table == table and len(c.values) == len(channel.values)]
         if len(clocks) > 1:
             names = " or ".join(repr(source.label(clock)) for clock in clocks[:4])
             raise ImportingError(
@@ -60,8 +57,9 @@ def clock_of(
                 'file, as "time" or in the field "time" of the channel'
             )
         if clocks:
-            return _read(source, mapping, clocks[0])
-        table = table.rpartition(".")[0] if table else None
+            return read_times(source, mapping, clocks[0])
+    for clock in called:
+        source.check(clock)
     raise ImportingError(
         f"{source.path}: no channel holds the times of {channel.name}: name one, with its unit, as "
         '"time" in a mapping file'
@@ -74,27 +72,29 @@ def _is_called(channel: SourceChannel, name: str) -> bool:
     return name in (own, channel.full_name, own.rpartition(".")[2], split_name(own)[0])
 
 
-def _holds_times(channel: SourceChannel) -> bool:
+def holds_times(channel: SourceChannel) -> bool:
     """Whether a channel is called a time, or has a unit of time and increases throughout."""
     if meaning(channel.name, channel.unit) == "time":
-        return bool(channel.known.size)
+        return bool(channel.known.size or channel.fault)
     unit = parsed_unit(channel.unit or split_name(channel.name)[1])
     timed = unit is not None and unit.quantity == "time" and channel.known.size
     return bool(timed and np.all(np.diff(channel.known) > 0))
 
 
-def _read(
+def read_times(
     source: SourceFile, mapping: MappingFile, times: SourceChannel
 ) -> tuple[NDArray, np.datetime64 | None]:
     """The mapping file's unit and factor come before the file's own."""
-    entry = mapping.channels.get("time", ChannelEntry())
-    text = entry.unit or times.unit or split_name(times.name)[1] or "s"
-    unit = needed_unit(text, "time", f"{source.path}, {times.name}")
-    return in_order(times.values) * unit.size * entry.factor, times.begin
-
-
-SUPPLY_PAIR = ("p1a", "p1b")
-REQUIRED = tuple(name for name in CHANNELS if name != "p1")
+    source.check(times)
+    entry = mapping.entry("time")
+    text = entry.unit or times.unit or split_name(times.name)[1]
+    if not text and 0.0 < np.median(np.abs(np.diff(times.known))) < SHORTEST_STEP:
+        raise ImportingError(
+            f"{source.path}, {times.name} has no unit, and steps too short for seconds: give its unit "
+            f"in a mapping file, for days {mapping_example({'time': times.name}, {'time': 'd'})}"
+        )
+    unit = needed_unit(text or "s", "time", f"{source.path}, {times.name}")
+    return times.values * unit.size * entry.factor, times.begin
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -102,7 +102,7 @@ class MappedChannel:
     """A channel of a file whose meaning, unit and times are known."""
 
     name: str
-    """Of the recording's channel: one of channel_names.QUANTITY but time."""
+    """Of the recording's channel: one of CHANNELS."""
     source: SourceChannel
     unit: PhysicalUnit
     reference: str
@@ -115,52 +115,81 @@ class MappedChannel:
     """The point in time at which its file's clock is 0; None: not told."""
     values: NDArray
     """(samples,) [SI; pressures absolute]."""
+    lines: NDArray | None
+    """Line of each sample in a text file, (samples,)."""
     filled: int
     """Missing readings that were filled from their neighbours."""
+    left: int
+    """Missing readings at the begin and the end, which were left out."""
     period: float | None = None
     """Between samples [s], once they lie on a uniform grid; None: not known, or they jitter."""
+    treated: str = "as recorded"
+    """How the common grid has its values, in words."""
+
+    @property
+    def rate(self) -> float:
+        """Samples per second of the file, whose times may jitter [1/s]."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
 
     @property
     def conversion(self) -> str:
         """What was done to the readings, in words."""
-        steps = [f"× {self.unit.size * self.factor:g}"]
-        steps += ["+ ambient pressure"] if self.reference == "gauge" else []
-        return " ".join(steps)
+        ambient = " + ambient pressure" if self.reference == "gauge" else ""
+        return f"× {self.unit.size * self.factor:g}{ambient}"
 
 
 def chosen_channels(source: SourceFile, mapping: MappingFile) -> dict[str, SourceChannel]:
-    """The channel of the file for each of a recording. Raises ImportingError for what is unclear."""
-    chosen = {
-        name: named_channel(source, entry.source)
+    """The channel of the file for each of a recording. Raises ImportingError."""
+    named = {
+        name: [named_channel(source, entry.source)]
         for name, entry in mapping.channels.items()
-        if name != "time" and entry.source
+        if entry.source and name != "time"
     }
-    taken = {id(channel) for channel in chosen.values()}
+    taken = {id(channel) for (channel,) in named.values()}
     free = [channel for channel in source.channels if id(channel) not in taken]
-    candidates = {n: cs for n, cs in proposed(free).items() if n != "time" and n not in chosen}
-    several = {n: [source.label(c) for c in cs[:4]] for n, cs in candidates.items() if len(cs) > 1}
-    if several:
-        listed = ", ".join(f"{n} may be {' or '.join(map(repr, names))}" for n, names in several.items())
-        first = {name: labels[0] for name, labels in several.items()}
-        raise ImportingError(
-            f"{source.path}: {listed}: choose in a mapping file such as "
-            f"{mapping_example(first, units=False)}"
-        )
-    chosen |= {name: channels[0] for name, channels in candidates.items()}
-    if "p1" in chosen:
-        chosen = {name: channel for name, channel in chosen.items() if name not in SUPPLY_PAIR}
-    _check_complete(source, mapping, chosen)
-    silent = {
-        name: source.label(channel)
-        for name, channel in chosen.items()
-        if not _unit_text(mapping.channels.get(name, ChannelEntry()), channel)
-    }
-    if silent:
-        raise ImportingError(
-            f"{source.path}: there is no unit of {', '.join(silent)}: give the right ones in a mapping "
-            f"file such as {mapping_example(silent)}"
-        )
+    found = {**proposed(free), **named}
+    timed = "time" in mapping.channels or any(c.time is not None or holds_times(c) for c in free)
+    found.pop("time", None)
+    missing = [name for name in CHANNELS if name not in found]
+    missing = missing if timed or not missing else ["time", *missing]
+    chosen = {name: channels[0] for name, channels in found.items()}
+    for channel in chosen.values():
+        source.check(channel)
+    silent = [name for name, c in chosen.items() if not _unit_text(mapping.entry(name), c)]
+    several = {name: channels for name, channels in found.items() if len(channels) > 1}
+    if several or silent or missing:
+        raise _unclear(source, chosen, several, silent, missing)
     return chosen
+
+
+def _unclear(
+    source: SourceFile,
+    chosen: Mapping[str, SourceChannel],
+    several: Mapping[str, Sequence[SourceChannel]],
+    silent: Sequence[str],
+    missing: Sequence[str],
+) -> ImportingError:
+    """All that a file leaves unclear, with a mapping file that says it.
+
+    several, silent: channels that several of the file may be, or that have no unit.
+    """
+    said = [
+        f"{name} may be {' or '.join(repr(source.label(channel)) for channel in channels[:4])}"
+        for name, channels in several.items()
+    ]
+    if silent:
+        said.append(f"there is no unit of {', '.join(silent)}")
+    if missing:
+        used = {id(channel) for channel in chosen.values()}
+        free = [c for c in source.channels if id(c) not in used and meaning(c.name, c.unit) != "time"]
+        labels = ", ".join(source.label(channel) for channel in free[:20])
+        said.append(f"no channel is known to be {', '.join(missing)}; not used are {labels or 'none'}")
+    sources = {n: source.label(c) for n, c in chosen.items() if n in (*several, *silent)}
+    units = {name: EXAMPLES[QUANTITY[name]] for name in (*silent, *missing)}
+    example = mapping_example(sources | dict.fromkeys(missing, "NAME"), units)
+    return ImportingError(
+        f"{source.path}: {'; '.join(said)}: say it in a mapping file such as {example}"
+    )
 
 
 def mapped_channels(
@@ -174,29 +203,15 @@ def mapped_channels(
         _mapped(source, mapping, name, channel, ambient)
         for name, channel in chosen_channels(source, mapping).items()
     ]
-    offsets = begin_offsets(str(source.path), [channel.begin for channel in mapped])
-    return [
-        replace(channel, time=channel.time + offset)
-        for channel, offset in zip(mapped, offsets, strict=True)
-    ]
-
-
-def _check_complete(
-    source: SourceFile, mapping: MappingFile, chosen: Mapping[str, SourceChannel]
-) -> None:
-    supply = () if "p1" in chosen or all(name in chosen for name in SUPPLY_PAIR) else ("p1",)
-    missing = [name for name in (*supply, *REQUIRED) if name not in chosen]
-    if missing:
-        used = {id(channel) for channel in chosen.values()}
-        clocks = {id(c) for c in source.channels if meaning(c.name, c.unit) == "time"}
-        timed = clocks or any(channel.time is not None for channel in source.channels)
-        missing = missing if timed or "time" in mapping.channels else ["time", *missing]
-        free = [source.label(channel) for channel in source.channels if id(channel) not in used | clocks]
+    begins = [channel.begin for channel in mapped if channel.begin is not None]
+    if 0 < len(begins) < len(mapped):
         raise ImportingError(
-            f"{source.path}: no channel is known to be {', '.join(missing)}; not used are "
-            f"{', '.join(free[:20]) or 'none'}: name it in a mapping file such as "
-            f"{mapping_example(dict.fromkeys(missing, 'NAME'))}"
+            f"{source.path}: some channels have points in time and others only times from a start that "
+            "the file does not tell: export all with the same kind of time"
         )
+    second = np.timedelta64(1, "s")
+    offsets = [(begin - min(begins)) / second for begin in begins] or [0.0] * len(mapped)
+    return [replace(c, time=c.time + float(offset)) for c, offset in zip(mapped, offsets, strict=True)]
 
 
 def _mapped(
@@ -206,20 +221,19 @@ def _mapped(
     channel: SourceChannel,
     ambient: float | None,
 ) -> MappedChannel:
-    entry = mapping.channels.get(name, ChannelEntry())
+    entry = mapping.entry(name)
     place = f"{source.path}, {channel.name}"
-    unit = _unit(place, name, channel, entry)
+    unit = needed_unit(_unit_text(entry, channel), QUANTITY[name], place)
     assumed = "gauge" if mapping.gauge else "absolute, assumed"
     reference = (unit.reference or assumed) if unit.quantity == "pressure" else ""
-    offset = 0.0
-    if reference == "gauge":
-        if ambient is None:
-            raise ImportingError(
-                f"{place} is gauge pressure: give the environment's pressure with --ambient-bar or in "
-                "the mapping file"
-            )
-        offset = ambient
-    times, begin = clock_of(source, mapping, channel, entry.time)
+    if reference == "gauge" and ambient is None:
+        raise ImportingError(
+            f"{place} is gauge pressure: give the environment's pressure with --ambient-bar or in the "
+            "mapping file"
+        )
+    offset = ambient if reference == "gauge" and ambient is not None else 0.0
+    own = None if entry.time is None else named_channel(source, entry.time)
+    times, begin = read_times(source, mapping, own) if own else clock_of(source, mapping, channel)
     if len(times) != len(channel.values):
         raise ImportingError(
             f"{place} has {len(channel.values)} samples and {len(times)} times: export it with one time "
@@ -227,9 +241,9 @@ def _mapped(
         )
     steps = np.diff(times[np.isfinite(times)])
     steps = steps[steps > 1e-9]  # no converter is faster; stamps of few digits repeat
-    longest = max(1, int(LONGEST_GAP / np.median(steps))) if steps.size else 0
+    longest = max(1, int(LONGEST_GAP / np.median(steps) + 1e-6)) if steps.size else 0
     times = _bridged(times, longest)
-    readings = _bridged(channel.values, longest, holds=name in COMMANDS)
+    readings = _bridged(channel.values, longest, holds=name == "U")
     good = np.isfinite(times) & np.isfinite(readings)
     if np.count_nonzero(good) < 2:
         raise ImportingError(f"{place} has fewer than two samples: leave the file out")
@@ -242,22 +256,10 @@ def _mapped(
         time=times[good],
         begin=begin,
         values=entry.factor * unit.size * readings[good] + offset,
+        lines=None if channel.lines is None else channel.lines[good],
         filled=int(np.count_nonzero(good & ~np.isfinite(channel.values))),
+        left=int(good.argmax() + good[::-1].argmax()),
     )
-
-
-def _unit(place: str, name: str, channel: SourceChannel, entry: ChannelEntry) -> PhysicalUnit:
-    inside = split_name(channel.name)[1]
-    text = _unit_text(entry, channel)
-    unit = needed_unit(text, QUANTITY[name], place)
-    if not entry.unit and channel.unit and inside:
-        other = needed_unit(inside, QUANTITY[name], place)
-        if not np.isclose(other.size, unit.size, rtol=1e-6):
-            raise ImportingError(
-                f"{place} has {inside!r} in its name and {text!r} as its unit: give the right unit in a "
-                "mapping file"
-            )
-    return unit
 
 
 def _unit_text(entry: ChannelEntry, channel: SourceChannel) -> str:
@@ -277,11 +279,3 @@ def _bridged(values: NDArray, longest: int, *, holds: bool = False) -> NDArray:
     run: Any = missing.groupby((~missing).cumsum()).transform("sum")
     filled = series.ffill() if holds else series.interpolate(limit_area="inside")
     return filled.where(~missing | (run <= longest)).to_numpy()
-
-
-def supply_pair_mean(signals: Mapping[str, NDArray]) -> dict[str, NDArray]:
-    """Signals, each (samples,), in which p1 stands for the mean of p1a and p1b."""
-    if not all(name in signals for name in SUPPLY_PAIR):
-        return dict(signals)
-    rest = {name: values for name, values in signals.items() if name not in SUPPLY_PAIR}
-    return {**rest, "p1": np.mean([signals[name] for name in SUPPLY_PAIR], axis=0)}

@@ -3,13 +3,14 @@
 Channels of other rates and jittering times are resampled in three steps. A cubic spline through the
 samples at their true times gives values on a fine uniform grid; it takes jitter out. A symmetric
 low-pass (Kaiser window) on the fine grid removes what the lower of both rates cannot carry; being
-symmetric about each sample it delays nothing. Every n-th value is kept. What goes in steps would ring:
-the coil's voltage and other commands are held from one entry to the next instead.
+symmetric about each sample it delays nothing. Every n-th value is kept. The coil's voltage would ring:
+it is held from one entry to the next instead.
 """
 
 import math
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,9 +18,12 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 from scipy.signal import firwin, kaiserord, oaconvolve
 
-from identification.importing.channels import COMMANDS, MappedChannel
+from identification.importing.channels import MappedChannel
 from identification.importing.source_file import ImportingError
-from identification.recordings.columns import LEAST_RATE, last_digit, roundest
+from identification.recordings.columns import LEAST_RATE, Place, last_digit, roundest
+from identification.recordings.plausibility import longest_run
+from identification.recordings.recording import UNITS
+from identification.recordings.recording_checks import check_clipped
 
 MOST_STEP = 1.75
 """Longest step over the usual one. A missing sample makes 2; jitter of a third of a period, 1.67."""
@@ -35,62 +39,54 @@ SAME_TIME = 1e-2
 """Part of a period by which times may differ and count as the same samples. At 2 kHz these are 5 µs, in
 which the steepest pressure changes by less than its noise."""
 LEAST_STEP = 0.1
-"""Least change over the range of a channel that goes in steps; what is measured changes by less."""
+"""Least change over the range of a voltage that goes in steps; one that is measured changes by less."""
 GREATEST_RATE = 20_000.0
 """Greatest rate of a campaign [1/s]; a faster bench is brought down to it. Valve and sensors are
 slower, and longer files only cost time."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class GriddedSignals:
-    """The channels of a recording on common times."""
-
-    period: float
-    """Between samples [s]."""
-    signals: Mapping[str, NDArray]
-    """By channel, each (samples,) [SI]."""
-    resampled: tuple[str, ...]
-    """Channels that were filtered: their samples are not the file's own."""
-    held: tuple[str, ...]
-    """Channels of which each sample is the file's last entry before it."""
-
-
 def on_common_grid(
-    place: str, channels: Sequence[MappedChannel], rate: float | None = None
-) -> GriddedSignals:
-    """The channels on one uniform grid; samples that lie on it already are left as they are.
+    path: Path, channels: Sequence[MappedChannel], rate: float | None = None
+) -> tuple[float, list[MappedChannel]]:
+    """The channels on one uniform grid, and its period [s]; samples that lie on it stay as they are.
 
     Args:
-        place: begins the messages.
+        path: of the measurement file.
         channels: of one recording.
         rate: wanted samples per second [1/s]; None: the slowest channel's.
 
     Raises ImportingError for times with gaps, out of order or too slow.
     """
     for channel in channels:
-        _check_times(f"{place}, {channel.source.name}", channel)
+        _check_times(f"{path}, {channel.source.name}", channel)
     channels = [_on_its_grid(channel) for channel in channels]
     sampled = [channel for channel in channels if not _is_logged_on_change(channel)]
-    periods = [
-        channel.period or 1.0 / max(round(usual_rate(channel.time)), LEAST_RATE)
-        for channel in sampled
-        if channel.name != "sigma_S"
-    ]
+    periods = [c.period or 1.0 / max(round(c.rate), LEAST_RATE) for c in sampled]
     period = max(*periods, 1.0 / GREATEST_RATE) if rate is None else 1.0 / rate
-    grid = _grid(place, channels, sampled, period)
-    signals, changed, held = {}, [], []
-    for channel in channels:
-        first = _first_sample(channel, grid, period)
-        if first is not None:
-            signals[channel.name] = channel.values[first : first + len(grid)]
-        elif channel.name == "U" or _goes_in_steps(channel.values):
-            last = np.searchsorted(channel.time, grid + SAME_TIME * period, side="right") - 1
-            signals[channel.name] = channel.values[last]
-            held.append(channel.name)
-        else:
-            signals[channel.name] = resampled(channel.time, channel.values, grid)
-            changed.append(channel.name)
-    return GriddedSignals(period=period, signals=signals, resampled=tuple(changed), held=tuple(held))
+    grid = _grid(path, channels, sampled, period)
+    return period, [_gridded(path, channel, grid, period) for channel in channels]
+
+
+def _gridded(path: Path, channel: MappedChannel, grid: NDArray, period: float) -> MappedChannel:
+    """The channel at the times of a grid, (samples,) [s]."""
+    first = _first_sample(channel, grid, period)
+    if first is not None:
+        part = slice(first, first + len(grid))
+        lines = None if channel.lines is None else channel.lines[part]
+        return replace(channel, values=channel.values[part], lines=lines)
+    if channel.name == "U":
+        last = np.searchsorted(channel.time, grid + SAME_TIME * period, side="right") - 1
+        return replace(
+            channel,
+            values=channel.values[last],
+            lines=None,
+            treated="at other times, held from the entry before",
+        )
+    place = Place(file=f"{path}, {channel.source.name}", lines=channel.lines)
+    readings = channel.values / UNITS[channel.name][1]
+    check_clipped(place, channel.name, readings, 1.0 / channel.rate)  # the filter would hide it
+    values = resampled(channel.time, channel.values, grid)
+    return replace(channel, values=values, lines=None, treated="at other times, low-pass filtered")
 
 
 def _on_its_grid(channel: MappedChannel) -> MappedChannel:
@@ -108,51 +104,60 @@ def _on_its_grid(channel: MappedChannel) -> MappedChannel:
     return channel
 
 
-def _goes_in_steps(values: NDArray) -> bool:
-    """Whether values (samples,) only stay as they are or jump: a filter would make them ring."""
-    change = np.abs(np.diff(values))
-    return bool(np.all((change == 0.0) | (change > LEAST_STEP * np.ptp(values))))
-
-
 def _is_logged_on_change(channel: MappedChannel) -> bool:
-    """Whether the entries of a command are its changes, at most each with the values around it."""
-    if channel.name not in COMMANDS or usual_rate(channel.time) >= LEAST_RATE:
+    """Whether the entries of the voltage are its changes, at most each with the values around it."""
+    if channel.name != "U" or channel.rate >= LEAST_RATE:
         return False
-    changes = np.diff(channel.values) != 0.0
-    dense = not np.any(changes) or float(np.mean(changes)) >= 1.0 / 3.0  # a sampled one mostly stays
-    return dense and _goes_in_steps(channel.values)
+    changes = np.abs(np.diff(channel.values))
+    dense = (
+        not np.any(changes) or float(np.mean(changes > 0.0)) >= 1.0 / 3.0
+    )  # a sampled one mostly stays
+    return dense and bool(np.all((changes == 0.0) | (changes > LEAST_STEP * np.ptp(channel.values))))
 
 
 def _check_times(place: str, channel: MappedChannel) -> None:
+    """Times increase without gaps, fast enough. Raises ImportingError."""
     steps = np.diff(channel.time)
     backward = np.flatnonzero(steps <= 0)
     if backward.size:
         at, falls = channel.time[backward[0]], steps[backward[0]] < 0
+        line = "" if channel.lines is None else f" (line {channel.lines[backward[0] + 1]})"
         remedy = "cut the recording there, or sort its samples if they are out of order"
         remedy = remedy if falls else "print it with more digits"
-        raise ImportingError(f"{place}: time does not increase after {at:.6g} s: {remedy}")
+        raise ImportingError(f"{place}: time does not increase after {at:.6g} s{line}: {remedy}")
     if _is_logged_on_change(channel):
         return
     usual = float(np.median(steps))
     gap = np.flatnonzero(steps > MOST_STEP * usual)
     if gap.size:
         first, last = channel.time[gap[0]], channel.time[gap[0] + 1]
-        absent = np.count_nonzero(~np.isfinite(channel.source.values))
-        why = f", and {absent} readings are empty or marked invalid" if absent else ""
-        remedy = "" if absent else ", or print the time with more digits"
         raise ImportingError(
             f"{place}: no samples from {first:.6g} to {last:.6g} s, where the usual step is {usual:.3g} "
-            f"s{why}: cut the recording there, since a gap is not filled{remedy}"
+            f"s{_absent(channel)}"
         )
-    if channel.name != "sigma_S" and usual * LEAST_RATE > 1.0 + 1e-3:
+    if usual * LEAST_RATE > 1.0 + 1e-3:
         raise ImportingError(
             f"{place}: sampled at {1 / usual:.4g} Hz: record at {LEAST_RATE:g} Hz or faster, or "
             "give the right unit of time in a mapping file"
         )
 
 
+def _absent(channel: MappedChannel) -> str:
+    """The longest stretch of missing readings, what the file says of it, and the remedy."""
+    values, lines = channel.source.values, channel.source.lines
+    first, count = longest_run(~np.isfinite(values))
+    cut = "cut the recording there, since a gap is not filled"
+    if not count:
+        return f": {cut}, or print the time with more digits"
+    ends = [first + 1, first + count] if lines is None else [lines[first], lines[first + count - 1]]
+    place = f"{'readings' if lines is None else 'lines'} {ends[0]} to {ends[1]}"
+    if np.isinf(values[first : first + count]).any():
+        return f", and {place} are over-range: record again with a greater range, or {cut}"
+    return f", and {place} are empty or marked as missing: {cut}"
+
+
 def _grid(
-    place: str, channels: Sequence[MappedChannel], sampled: Sequence[MappedChannel], period: float
+    path: Path, channels: Sequence[MappedChannel], sampled: Sequence[MappedChannel], period: float
 ) -> NDArray:
     """Times within all channels, (samples,) [s], on the samples of a uniform channel if there is one."""
     start = max(float(channel.time[0]) for channel in channels)
@@ -164,7 +169,7 @@ def _grid(
             break
     count = int(np.floor((end - start) / period + 1e-2)) + 1
     if count < 2:
-        raise ImportingError(f"{place}: its channels have no time in common: export them together")
+        raise ImportingError(f"{path}: its channels have no time in common: export them together")
     return start + period * np.arange(count)
 
 
@@ -178,11 +183,6 @@ def _first_sample(channel: MappedChannel, grid: NDArray, period: float) -> int |
     return first if fits and abs(apart) <= SAME_TIME * period else None
 
 
-def usual_rate(time: NDArray) -> float:
-    """Samples per second of times (samples,) [s] that may jitter [1/s]."""
-    return (len(time) - 1) / float(time[-1] - time[0])
-
-
 def resampled(time: NDArray, values: NDArray, grid: NDArray) -> NDArray:
     """Values on a uniform grid, (grid,), in the unit of `values`.
 
@@ -192,7 +192,7 @@ def resampled(time: NDArray, values: NDArray, grid: NDArray) -> NDArray:
         grid: wanted times, uniform, (grid,) [s].
     """
     period = float(grid[-1] - grid[0]) / (len(grid) - 1)
-    own = usual_rate(time)
+    own = (len(time) - 1) / float(time[-1] - time[0])
     lower, dense = min(own, 1.0 / period), max(1, math.ceil(RESAMPLING_MARGIN * own * period))
     step = period / dense
     count, beta = kaiserord(STOP_ATTENUATION, 2.0 * (STOPBAND - PASSBAND) * lower * step)

@@ -1,9 +1,10 @@
-"""`import_campaign`: measurement files of a bench become a campaign."""
+"""`read_files`: measurement files of a bench become a campaign."""
 
 import hashlib
+import json
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from os import PathLike
 from pathlib import Path
 from typing import Any
@@ -12,14 +13,15 @@ import msgspec
 import numpy as np
 import pandas as pd
 
-from epv_env.common.files import LARGEST_FILE
+from epv_env.common.files import read_bytes
 from epv_env.common.units import BAR
 from identification.importing.binary_files import read_matlab, read_mdf, read_parquet, read_tdms
-from identification.importing.channels import MappedChannel, mapped_channels, supply_pair_mean
-from identification.importing.common_grid import GriddedSignals, on_common_grid, usual_rate
-from identification.importing.mapping_file import MappingFile, RecordingEntry, meaning, read_mapping
-from identification.importing.source_file import ImportingError, SourceFile
+from identification.importing.channels import MappedChannel, mapped_channels
+from identification.importing.common_grid import on_common_grid
+from identification.importing.mapping_file import FORMAT, MappingFile, meaning, proposed, read_mapping
+from identification.importing.source_file import NO_NUMBERS, ImportingError, SourceFile, usable
 from identification.importing.text_files import read_text
+from identification.recordings.columns import Place
 from identification.recordings.plausibility import switches
 from identification.recordings.recording import CHANNELS, RULES, Campaign, Recording, RecordingRules
 
@@ -33,6 +35,7 @@ FORMATS = (
 """Name, reader and suffixes of every format. A new one is a reader and a line here.
 
 A reader takes a path and returns the version or dialect, and the channels; it may raise ImportingError.
+That of text takes marks of missing readings, too.
 """
 
 USUAL_TEMPERATURE, USUAL_PRESSURE = 293.0, 1.0 * BAR
@@ -44,9 +47,24 @@ class ImportedFile:
     """One measurement file and the recording that it became."""
 
     source: SourceFile
-    channels: tuple[MappedChannel, ...]
-    gridded: GriddedSignals
+    channels: Sequence[MappedChannel]
     recording: Recording
+
+    def rows(self) -> list[dict[str, str]]:
+        """What became of each channel, as texts by heading."""
+        return [
+            {
+                "becomes": channel.name,
+                "channel": channel.source.full_name,
+                "unit": f"{channel.unit.text} {channel.reference}".strip(),
+                "to SI": channel.conversion,
+                "rate": f"{channel.rate:.6g} Hz",
+                "samples": channel.treated
+                + (f", {channel.filled} missing filled" if channel.filled else "")
+                + (f", {channel.left} missing at the ends left out" if channel.left else ""),
+            }
+            for channel in self.channels
+        ]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,36 +76,33 @@ class ImportedCampaign:
     assumptions: tuple[str, ...]
     """What nobody said and the import took for granted, a sentence each."""
 
+    @property
+    def places(self) -> dict[str, Place]:
+        """What messages call the recordings, by name: measurement files with their lines, or times."""
+        found = {}
+        for file in self.files:
+            told = [c.lines for c in file.channels if c.lines is not None and not file.source.joined]
+            where: dict[str, Any] = {"lines": told[0]} if told else {"period": file.recording.period}
+            found[file.recording.name] = Place(file=str(file.source.path), **where)
+        return found
+
     def provenance(self) -> dict[str, Any]:
         """Where each recording comes from and what was done to it, for campaign.json."""
         files = [
             {
                 "recording": file.recording.name,
-                "source": file.source.path.name,
-                "sha256": file.source.sha256,
+                "sources": {s.path.name: s.sha256 for s in (file.source, *file.source.joined)},
                 "format": file.source.format,
-                "rate_Hz": 1.0 / file.gridded.period,
-                "channels": {
-                    channel.name: {
-                        "source": channel.source.name,
-                        "unit": channel.unit.text,
-                        **({"reference": channel.reference} if channel.reference else {}),
-                        "to_SI": channel.conversion,
-                        "resampled": channel.name in file.gridded.resampled,
-                        "held": channel.name in file.gridded.held,
-                        "filled": channel.filled,
-                    }
-                    for channel in file.channels
-                },
+                "rate_Hz": 1.0 / file.recording.period,
+                "channels": file.rows(),
             }
             for file in self.files
         ]
-        assumptions = list(self.assumptions)
-        return {"made_by": "python -m identification import", "assumptions": assumptions, "files": files}
+        return {"made_by": "epv import", "assumptions": list(self.assumptions), "files": files}
 
 
 def read_files(
-    files: Sequence[str | PathLike[str]],
+    files: Sequence[str | PathLike[str] | SourceFile],
     *,
     mapping: str | PathLike[str] | MappingFile | None = None,
     ambient_bar: float | None = None,
@@ -100,7 +115,8 @@ def read_files(
     """The campaign that measurement files make, in memory.
 
     Args:
-        files: MDF, MATLAB, TDMS, Parquet or text; each becomes one recording.
+        files: MDF, MATLAB, TDMS, Parquet or text, or what `read_source` made of them; each becomes one
+            recording, unless the mapping file joins it to another.
         mapping: a mapping file or its content, for what names and units do not say.
         ambient_bar: p_env [bar absolute]; None: the mapping file's, else 1 bar, which is said.
         temperature_K: T_env [K]; None: likewise, else 293 K.
@@ -117,20 +133,16 @@ def read_files(
     if isinstance(mapping, str | PathLike):
         content = read_mapping(Path(mapping))
     content = msgspec.structs.replace(content, gauge=gauge or content.gauge)
-    sources = [read_source(Path(file)) for file in files]
-    names = [source.path.name for source in sources]
-    for entry in content.recordings:
-        if entry not in names:
-            raise ImportingError(
-                f"the mapping file's recordings name {entry!r}, which is not among {', '.join(names)}: "
-                "give that file, too, or take it out"
-            )
+    sources = joined(
+        [f if isinstance(f, SourceFile) else read_source(Path(f), content.missing) for f in files],
+        content,
+    )
     pressure = content.environment.pressure_bar if ambient_bar is None else ambient_bar
     temperature = content.environment.temperature_K if temperature_K is None else temperature_K
     given = None if pressure is None else round(pressure * BAR, 6)
-    imported = tuple(_imported(source, content, given, rate) for source in sources)
+    imported = tuple(_imported(source, sources, content, given, rate) for source in sources)
     campaign = Campaign(
-        name=name or Path(files[0]).resolve().parent.name or "bench run",
+        name=name or sources[0].path.resolve().parent.name or "bench run",
         temperature=USUAL_TEMPERATURE if temperature is None else temperature,
         pressure=USUAL_PRESSURE if given is None else given,
         recordings=tuple(file.recording for file in imported),
@@ -140,27 +152,68 @@ def read_files(
     return ImportedCampaign(campaign=campaign, files=imported, assumptions=assumptions)
 
 
+def joined(sources: Sequence[SourceFile], content: MappingFile) -> list[SourceFile]:
+    """The files, with the channels of those that the mapping file joins. Raises ImportingError."""
+    known = {source.path.name: source for source in sources}
+    others = [other for entry in content.recordings.values() for other in entry.join]
+    for named in (*content.recordings, *others):
+        if named not in known:
+            raise ImportingError(
+                f"the mapping file's recordings name {named!r}, which is not among {', '.join(known)}: "
+                "give that file, too, or take it out"
+            )
+    if chained := [file for file, entry in content.recordings.items() if entry.join and file in others]:
+        raise ImportingError(
+            f"the mapping file joins {chained[0]} to itself or to a file that is joined: name all files "
+            "of a recording at the first of them"
+        )
+    own = [source for source in sources if source.path.name not in others]
+    return [
+        replace(
+            source,
+            channels=tuple(
+                replace(channel, file=part.path.name if parts else "")
+                for part in (source, *parts)
+                for channel in part.channels
+            ),
+            joined=parts,
+        )
+        for source in own
+        for parts in [tuple(known[other] for other in content.recording(source.path).join)]
+    ]
+
+
 def _imported(
     source: SourceFile,
+    sources: Sequence[SourceFile],
     content: MappingFile,
     ambient: float | None,
     rate: float | None,
 ) -> ImportedFile:
-    """One file as a recording; ambient: p_env [Pa absolute], None if nobody gave it."""
+    """One of the files as a recording; ambient: p_env [Pa absolute], None if nobody gave it."""
+    known = {*proposed(source.channels), *(n for n, e in content.channels.items() if e.source)}
+    missing = [name for name in CHANNELS if name not in known]
+    holding = [s.path.name for s in sources if {*missing} & set(proposed(s.channels))]
+    if holding:
+        example = {"format": FORMAT, "recordings": {source.path.name: {"join": holding}}}
+        raise ImportingError(
+            f"{source.path} has no {', '.join(missing)}, which {', '.join(holding)} may hold: if "
+            f"these are one recording, join them in a mapping file such as {json.dumps(example)}"
+        )
     channels = mapped_channels(source, content, ambient)
-    gridded = on_common_grid(str(source.path), channels, rate)
-    signals: dict[str, Any] = supply_pair_mean(gridded.signals)
-    entry = content.recordings.get(source.path.name, RecordingEntry())
+    period, channels = on_common_grid(source.path, channels, rate)
+    signals: dict[str, Any] = {channel.name: channel.values for channel in channels}
+    entry = content.recording(source.path)
     named_so = re.search("(?<![a-z])valid", source.path.stem.lower())
-    proposed = "validation" if named_so else "calibration"
+    role = "validation" if named_so else "calibration"
     recording = Recording(
         name=entry.name or source.path.stem,
-        role=entry.role or (proposed if switches(signals["U"]) else "quality"),
-        period=gridded.period,
-        sigma_S=signals.get("sigma_S", np.zeros_like(signals["U"])),
-        **{name: signals[name] for name in CHANNELS},
+        role=entry.role or (role if switches(signals["U"]) else "quality"),
+        period=period,
+        sigma_S=np.zeros_like(signals["U"]),
+        **signals,
     )
-    return ImportedFile(source=source, channels=tuple(channels), gridded=gridded, recording=recording)
+    return ImportedFile(source=source, channels=channels, recording=recording)
 
 
 def _assumptions(
@@ -170,7 +223,7 @@ def _assumptions(
     temperature: float | None,
 ) -> tuple[str, ...]:
     silent = {c.source.name for f in files for c in f.channels if c.reference == "absolute, assumed"}
-    unsaid = [f for f in files if not content.recordings.get(f.source.path.name, RecordingEntry()).role]
+    unsaid = [file for file in files if not content.recording(file.source.path).role]
     roles = ", ".join(f"{file.recording.name} {file.recording.role}" for file in unsaid)
     sentences = {
         f"ambient pressure {USUAL_PRESSURE / BAR:g} bar (give --ambient-bar)": pressure is None,
@@ -181,56 +234,42 @@ def _assumptions(
     return tuple(sentence for sentence, assumed in sentences.items() if assumed)
 
 
-def read_source(path: Path) -> SourceFile:
-    """The channels of a measurement file. Raises ImportingError."""
+def read_source(path: Path, missing: Sequence[str] = ()) -> SourceFile:
+    """The channels of a measurement file; missing: marks of missing readings. Raises ImportingError."""
     known = {suffix: (name, read) for name, read, suffixes in FORMATS for suffix in suffixes}
-    if not path.is_file():
-        state = "is no regular file" if path.exists() else "does not exist"
-        state = "is a folder" if path.is_dir() else state
-        raise ImportingError(f"{path} {state}: give the path of a measurement file")
     if path.suffix.lower() not in known:
         raise ImportingError(
             f"{path} has no suffix of a known kind: give one of {', '.join(sorted(known))}"
         )
     kind, read = known[path.suffix.lower()]
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise ImportingError(
-                f"{path} is larger than {LARGEST_FILE:,} bytes: export the bench's channels alone, or "
-                "cut the recording"
-            )
-        with path.open("rb") as stream:
-            sha256 = hashlib.file_digest(stream, "sha256").hexdigest()
-        version, channels = read(path)
+        sha256 = hashlib.sha256(read_bytes(path)).hexdigest()
+        version, channels = read_text(path, missing) if read is read_text else read(path)
     except ImportingError:
         raise
     except OSError as error:
         reason = error.strerror or str(error).splitlines()[0][:160]
-        raise ImportingError(f"{path} cannot be read ({reason}): export it anew") from None
+        raise ImportingError(f"{path} cannot be read ({reason}): give a measurement file") from None
     except Exception as error:  # the formats' packages raise whatever they like on damaged files
         reason = (str(error).splitlines() or [type(error).__name__])[0][:160]
         raise ImportingError(f"{path} is damaged or no {kind} file ({reason}): export it anew") from None
-    if not any(channel.known.size for channel in channels):
-        others = ", ".join(channel.name for channel in channels[:20]) or "nothing"
-        raise ImportingError(
-            f"{path}: no series of numbers in it, but {others}: export the channels as numbers"
-        )
-    return SourceFile(path=path, format=version, sha256=sha256, channels=tuple(channels))
+    found = tuple(usable(channel, missing) for channel in channels)
+    if not any(channel.known.size for channel in found):
+        fault = next((channel.fault for channel in found if channel.fault), f"it {NO_NUMBERS}")
+        raise ImportingError(f"{path}, {fault}")
+    return SourceFile(path=path, format=version, sha256=sha256, channels=found)
 
 
 def source_table(source: SourceFile) -> str:
-    """The channels of a file: name, unit, range, rate, and what its name means."""
+    """The channels of a file: name, unit, range, and what its name means."""
     rows = []
     for channel in source.channels:
-        known, time = channel.known, channel.time
+        known = channel.known
         rows.append(
             {
                 "channel": source.label(channel),
                 "unit": channel.unit,
                 "range": f"{np.min(known):.5g} to {np.max(known):.5g}" if len(known) else "empty",
-                "rate": f"{usual_rate(time):.6g} Hz"
-                if time is not None and time.size and np.ptp(time) > 0
-                else "",
                 "proposed": meaning(channel.name, channel.unit) or "",
             }
         )
@@ -239,31 +278,10 @@ def source_table(source: SourceFile) -> str:
 
 def import_text(imported: ImportedCampaign) -> str:
     """What every file becomes, and what was assumed."""
-    parts = []
-    for file in imported.files:
-        gridded, recording = file.gridded, file.recording
-        treated = dict.fromkeys(gridded.resampled, "resampled") | dict.fromkeys(gridded.held, "held")
-        rows = [
-            {
-                "becomes": channel.name,
-                "channel": channel.source.name,
-                "unit": f"{channel.unit.text} {channel.reference}".strip(),
-                "to SI": channel.conversion,
-                "rate": f"{usual_rate(channel.time):.6g} Hz",
-                "samples": treated.get(channel.name, "as recorded")
-                + (f", {channel.filled} missing filled" if channel.filled else ""),
-            }
-            for channel in file.channels
-        ]
-        lines = [
-            f"{file.source.path.name} -> {recording.name}.csv, role {recording.role}, "
-            f"{len(recording)} samples at {1 / recording.period:.6g} Hz",
-            pd.DataFrame(rows).to_string(index=False),
-        ]
-        for names, what in (
-            (gridded.resampled, "other times than the file's, low-pass filtered"),
-            (gridded.held, "other times than the file's, each sample is the last entry before it"),
-        ):
-            lines += [f"{', '.join(names)}: {what}"] if names else []
-        parts.append("\n".join(lines))
+    parts = [
+        f"{file.source.path.name} -> {file.recording.name}.csv, role {file.recording.role}, "
+        f"{len(file.recording)} samples at {1 / file.recording.period:.6g} Hz\n"
+        f"{pd.DataFrame(file.rows()).to_string(index=False)}"
+        for file in imported.files
+    ]
     return "\n\n".join([*parts, "\n".join(f"assumed: {it}" for it in imported.assumptions)])

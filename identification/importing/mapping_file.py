@@ -4,45 +4,38 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Annotated
 
 import msgspec
 
 from epv_env.common.files import read_json
-from identification.importing.source_file import ImportingError, SourceChannel, SourceFile
-from identification.importing.units import EXAMPLES, parsed_unit
-from identification.recordings.recording import CHANNELS, ROLES, UNITS
-
-QUANTITY_OF_UNIT = {"A": "current", "V": "voltage", "bar": "pressure"}
+from identification.importing.source_file import (
+    LONGEST_NAME,
+    ImportingError,
+    SourceChannel,
+    SourceFile,
+)
+from identification.importing.units import parsed_unit
+from identification.recordings.recording import ROLES, UNITS
 
 QUANTITY: Mapping[str, str] = {
     "time": "time",
-    **{name: QUANTITY_OF_UNIT[unit] for name, (unit, _) in UNITS.items()},
-    "p1a": "pressure",
-    "p1b": "pressure",
-    "sigma_S": "mass flow",
+    **{n: {"A": "current", "V": "voltage"}.get(unit, "pressure") for n, (unit, _) in UNITS.items()},
 }
-"""What an import looks for, with its quantity. p1a and p1b, two sensors, may stand for p1."""
+"""What an import looks for, with its quantity."""
 
-NAMES: Mapping[str, tuple[str, ...]] = {name: (name.lower(),) for name in CHANNELS} | {
-    "time": ("time", "t", "zeit", "timestamp", "timestamps", "timechannel", "abszeit", "messzeit",
-             "xvalue"),
-    "I": ("i", "current", "strom", "icoil", "imv", "coilcurrent", "solenoidcurrent", "magnetstrom",
-          "spulenstrom", "istrom", "currentcoil", "imagnet", "isolenoid"),
-    "U": ("u", "v", "voltage", "spannung", "ucoil", "umv", "vcoil", "coilvoltage", "solenoidvoltage",
-          "magnetspannung", "spulenspannung", "voltagecoil", "umagnet", "usolenoid"),
-    "p1": ("p1", "pin", "pinput", "inputpressure", "supplypressure", "psupply", "eingangsdruck",
-           "vorratsdruck", "pvorrat", "reservoirpressure", "preservoir", "druck1", "pressure1",
-           "druckeingang", "inputchamberpressure", "pressuresupply"),
-    "p1a": ("p1a", "p11", "reservoir1", "pressure1a", "druck1a"),
-    "p1b": ("p1b", "p12", "reservoir2", "pressure1b", "druck1b"),
-    "p2": ("p2", "pout", "poutput", "outputpressure", "circuitpressure", "pcircuit", "ausgangsdruck",
-           "kreisdruck", "bremsdruck", "pkreis", "druck2", "pressure2", "druckausgang",
-           "outputchamberpressure", "pressurecircuit"),
-    "p3": ("p3", "pcontrol", "controlpressure", "pctrl", "steuerdruck", "pst", "psteuer", "druck3",
-           "pressure3", "drucksteuer", "controlchamberpressure", "pressurecontrol", "steuerkammerdruck"),
-    "sigma_S": ("sigmas", "consumption", "verbrauch", "massflow", "massenstrom", "consumedair",
-                "luftverbrauch"),
-}  # fmt: skip
+NAMES: Mapping[str, str] = {
+    "time": r"t|time|timestamps?|timechannel|(abs|mess)?zeit|xvalue",
+    "I": r"i|(coil|solenoid)?current|currentcoil|(magnet|spulen|i)?strom|i(coil|mv|magnet|solenoid)",
+    "U": r"[uv]|(coil|solenoid)?voltage|voltagecoil|(magnet|spulen)?spannung|[uv]coil"
+    r"|u(mv|magnet|solenoid)",
+    "p1": r"p(1|in|input|supply|vorrat|reservoir)|(supply|reservoir|input|inputchamber)pressure"
+    r"|(eingangs|vorrats)druck|druck(1|eingang)|pressure(1|supply)",
+    "p2": r"p(2|out|output|circuit|kreis)|(circuit|output|outputchamber)pressure"
+    r"|(ausgangs|kreis|brems)druck|druck(2|ausgang)|pressure(2|circuit)",
+    "p3": r"p(3|control|ctrl|st|steuer)|(control|controlchamber)pressure|steuer(kammer)?druck"
+    r"|druck(3|steuer)|pressure(3|control)",
+}
 """Names in lower case, without anything but letters and digits; English and German. A channel of the
 bench that is not listed has its own name."""
 
@@ -53,6 +46,8 @@ BRACKETED = re.compile(rf"^(.*?)\s*(?:[\[({{]({INSIDE})[\])}}]|\s(?:in|/)\s(\S+(
 
 def split_name(name: str) -> tuple[str, str]:
     """A channel's name without its unit, and the unit in it, empty if there is none."""
+    if len(name) > LONGEST_NAME:
+        return name, ""
     for place in (i for i, sign in enumerate(name) if sign == "_"):
         unit = parsed_unit(name[place + 1 :].replace("_per_", "/").replace("_", " "))
         if place and unit is not None and unit.quantity in QUANTITY.values():
@@ -70,8 +65,9 @@ def meaning(name: str, unit: str = "") -> str | None:
     bare, inside = split_name(name.split("\\")[0])
     plain = re.sub(r"[^a-z0-9]", "", bare.rpartition(".")[2].lower())
     parsed = parsed_unit(unit or inside)
-    for wanted, known in NAMES.items():
-        if plain in known and (parsed is None or parsed.quantity == QUANTITY[wanted]):
+    for wanted, quantity in QUANTITY.items():
+        known = re.fullmatch(NAMES.get(wanted, wanted.lower()), plain)
+        if known and (parsed is None or parsed.quantity == quantity):
             return wanted
     return None
 
@@ -80,7 +76,8 @@ def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]
     """The channels of a file that names and units propose, by what they mean; several: ambiguous."""
     found: dict[str, list[SourceChannel]] = {}
     for channel in channels:
-        name = meaning(channel.name, channel.unit) if channel.known.size else None
+        usable = channel.known.size or channel.fault
+        name = meaning(channel.name, channel.unit) if usable else None
         if name is not None:
             found.setdefault(name, []).append(channel)
     return found
@@ -89,8 +86,10 @@ def proposed(channels: Sequence[SourceChannel]) -> dict[str, list[SourceChannel]
 def named_channel(source: SourceFile, wanted: str) -> SourceChannel:
     """The one channel that a mapping file calls by this name. Raises ImportingError."""
     found = [c for c in source.channels if wanted in (c.name, c.full_name)]
-    found = found or [c for c in source.channels if split_name(c.name)[0] == wanted]
-    found = [channel for channel in found if channel.known.size] or found
+    found = found or [
+        c for c in source.channels if wanted in (split_name(c.name)[0], split_name(c.full_name)[0])
+    ]
+    found = [channel for channel in found if channel.known.size or channel.fault] or found
     if len(found) != 1:
         count = "no channel" if not found else f"{len(found)} channels"
         known = ", ".join(source.label(channel) for channel in source.channels[:20])
@@ -121,10 +120,12 @@ class ChannelEntry(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_o
 class RecordingEntry(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     """What becomes of one measurement file."""
 
-    role: str | None = None
+    role: Annotated[str, msgspec.Meta(pattern=f"^({'|'.join(ROLES)})$")] | None = None
     """One of ROLES; None: proposed from its name and voltage."""
     name: str | None = None
     """Of the recording; None: that of the file without its suffix."""
+    join: tuple[str, ...] = ()
+    """Names of files that hold further channels of the same recording, at times from the same begin."""
 
 
 class Environment(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
@@ -134,40 +135,41 @@ class Environment(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_on
     pressure_bar: float | None = None
 
 
+ChannelName = Annotated[str, msgspec.Meta(pattern=f"^({'|'.join(QUANTITY)})$")]
+
+
 class MappingFile(msgspec.Struct, forbid_unknown_fields=True, frozen=True, kw_only=True):
     """A mapping file; what it leaves out is proposed."""
 
     format: str = FORMAT
     environment: Environment = msgspec.field(default_factory=Environment)
-    channels: dict[str, ChannelEntry] = msgspec.field(default_factory=dict)
+    channels: dict[ChannelName, ChannelEntry] = msgspec.field(default_factory=dict)
     """By channel of the recording (QUANTITY)."""
     recordings: dict[str, RecordingEntry] = msgspec.field(default_factory=dict)
     """By the measurement file's name without its folder."""
     gauge: bool = False
     """Whether pressures are gauge where no unit says gauge or absolute."""
+    missing: tuple[str, ...] = ()
+    """What stands for a missing reading, as a cell or a number: "-9999"."""
+
+    def entry(self, name: str) -> ChannelEntry:
+        """What the file says of a channel of the recording."""
+        return self.channels.get(name, ChannelEntry())
+
+    def recording(self, path: Path) -> RecordingEntry:
+        """What the file says of a measurement file."""
+        return self.recordings.get(path.name, RecordingEntry())
 
 
-def mapping_example(sources: Mapping[str, str], *, units: bool = True) -> str:
-    """The text of a mapping file for channels of a recording by their names in the files."""
+def mapping_example(sources: Mapping[str, str], units: Mapping[str, str]) -> str:
+    """The text of a mapping file: names in the files, and units, of channels of a recording."""
     channels = {
-        n: {"source": s} | ({"unit": EXAMPLES[QUANTITY[n]]} if units else {}) for n, s in sources.items()
+        n: {"source": s} | ({"unit": units[n]} if n in units else {}) for n, s in sources.items()
     }
     return json.dumps({"format": FORMAT, "channels": channels}, ensure_ascii=False)
 
 
 def read_mapping(path: Path) -> MappingFile:
-    """A mapping file. Raises ImportingError or JSONFileError."""
+    """A mapping file. Raises JSONFileError."""
     remedy = "write it as docs/how-to/use-your-recordings.md shows"
-    mapping = read_json(path, MappingFile, version=FORMAT, remedy=remedy)
-    for name in mapping.channels:
-        if name not in QUANTITY:
-            raise ImportingError(
-                f"{path}: channels has {name!r}, and a recording has {', '.join(QUANTITY)}: rename it"
-            )
-    for file, entry in mapping.recordings.items():
-        if entry.role is not None and entry.role not in ROLES:
-            raise ImportingError(
-                f"{path}, recordings, {file}: unknown role {entry.role!r}: choose one of "
-                f"{', '.join(ROLES)}"
-            )
-    return mapping
+    return read_json(path, MappingFile, version=FORMAT, remedy=remedy)

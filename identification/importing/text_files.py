@@ -1,6 +1,6 @@
-"""CSV and other text tables of any dialect: encoding, separator, decimal sign, header rows, comments.
+"""CSV and other text tables of any dialect: encoding, separator, header rows, and what stands below.
 
-Cells hold numbers with a decimal point or comma, points in time, or a word for a missing reading.
+What is no row of samples above or below the numbers is left out, and said; all between has to be read.
 """
 
 import codecs
@@ -8,43 +8,26 @@ import csv
 import io
 import re
 from collections import Counter
-from collections.abc import Iterator, Sequence
-from itertools import islice, takewhile
+from collections.abc import Collection, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pandas as pd
 
-from identification.importing import times
+from identification.importing.cells import MISSING, OVER_RANGE, SURE_DECIMAL, X_COLUMN, Columns, is_value
 from identification.importing.mapping_file import meaning
-from identification.importing.source_file import (
-    MOST_CHANNELS,
-    ImportingError,
-    SourceChannel,
-    check_number,
-    limited,
-)
-from identification.importing.units import is_unit
-
-MARKS = (
-    (codecs.BOM_UTF8, "utf-8-sig"),
-    (codecs.BOM_UTF16_LE, "utf-16"),
-    (codecs.BOM_UTF16_BE, "utf-16"),
-)
-"""Byte order marks with their encodings."""
+from identification.importing.source_file import ImportingError, SourceChannel
+from identification.importing.times import is_point
+from identification.importing.units import is_unit, parsed_unit
 
 COMMENT = re.compile(r"\s*(#(?!NV|N/A|DIV|VAL|WERT)|%|//|!)")
 """Beginning of a line that holds no data."""
 
-MISSING = (
-    "NULL", "null", "None", "#NV", "#N/A", "N/A", "n/a", "n.a.", "NA", "NAN", "-", "--", "---", "***",
-    "1.#QNAN", "-1.#IND", "1.#INF", "-1.#INF", "#DIV/0!", "#VALUE!", "#WERT!",
-)  # fmt: skip
-"""Cells that hold no reading, beside empty ones, NaN and Inf."""
-
-COMMENT_COLUMN, UNIT_LABEL, X_COLUMN = "comment", "Y_Unit_Label", "X_Value"
-"""Of LabVIEW: a name beside those of the numbers, the title of a row of units, and the name of times."""
+COMMENT_COLUMN, UNIT_LABEL = "comment", "Y_Unit_Label"
+"""Of LabVIEW: a name beside those of the numbers, and the title of a row of units."""
 
 TYPES = re.compile(
     r"(float|double|l?real|single|long|d?word|byte|bool|u?d?int)\d*|[fiu]\d+", re.IGNORECASE
@@ -53,9 +36,6 @@ TYPES = re.compile(
 
 SEPARATORS = (";", "\t", ",", "|", " ")
 """Separators in the order in which they are preferred where several fit."""
-
-LONGEST_LINE = 50 * MOST_CHANNELS
-"""Most characters of a line."""
 
 SAMPLE = 40
 """Lines at the middle and at the end of a file from which the dialect is read."""
@@ -68,156 +48,174 @@ def cells_of(line: str, separator: str) -> list[str]:
     return [cell.strip() for cell in next(csv.reader([line], delimiter=separator))]
 
 
-def is_data(cells: Sequence[str]) -> bool:
-    """Whether a line's cells are numbers, points in time or missing, and not all of them missing."""
-    return any(map(_is_value, cells)) and all(
-        not cell or cell in MISSING or _is_value(cell) for cell in cells
-    )
-
-
-def _is_value(cell: str) -> bool:
-    try:
-        float(cell.replace(",", "."))
-    except ValueError:
-        return times.is_point(cell)
-    return "_" not in cell  # Python's own 1_000
-
-
 def decoded(file: str, content: bytes) -> tuple[str, str]:
-    """Text of a file and its encoding: by byte order mark, else UTF-8, else Windows-1252."""
-    encodings = [encoding for mark, encoding in MARKS if content.startswith(mark)]
-    zeros = (content[1:2000:2].count(0), content[0:2000:2].count(0))
-    if max(zeros) > min(len(content), 2000) // 4:
-        encodings += ["utf-16-le" if zeros[0] > zeros[1] else "utf-16-be"]
-    for encoding in (*encodings, "utf-8", "cp1252"):
-        try:
+    """Text of a file and its encoding: UTF-16 by its byte order mark, else UTF-8, else Windows-1252."""
+    wide = content[:2] in (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+    for encoding in ("utf-16",) if wide else ("utf-8-sig", "cp1252"):
+        with suppress(UnicodeDecodeError):
             return content.decode(encoding), encoding
-        except UnicodeDecodeError:
-            continue
     raise ImportingError(f"{file} is no text in UTF-8, UTF-16 or Windows-1252: save it as CSV in UTF-8")
 
 
-def found_separator(file: str, lines: Sequence[str]) -> str:
-    """The separator that makes most cells of the sampled lines data. Raises ImportingError."""
-    sample = _sample(lines)
-    if max(map(len, sample), default=0) > LONGEST_LINE:
+@dataclass(frozen=True, kw_only=True)
+class TextTable:
+    """The lines of a text file that may hold data, and how they are read."""
+
+    path: Path
+    lines: Sequence[tuple[int, str]]
+    """Number and text."""
+    missing: Collection[str]
+    """Marks of missing readings that the mapping file names."""
+    separator: str = ""
+    width: int = 0
+    """Cells of most lines."""
+    measured: tuple[int, ...] = ()
+    """Columns that hold numbers, points in time or marks in most of the sampled lines."""
+
+    def cells(self, line: int) -> list[str]:
+        """The cells of one of the lines."""
+        return cells_of(self.lines[line][1], self.separator)
+
+    def is_known(self, cell: str) -> bool:
+        """Whether a cell can be read, also as a reading that is missing or beyond the range."""
+        missing = not cell or cell in MISSING or cell in self.missing
+        return missing or is_value(cell) or bool(OVER_RANGE.fullmatch(cell))
+
+    def is_sample(self, line: int) -> bool:
+        """Whether a line has all cells, perhaps a comment after them, and begins as samples do."""
+        cells = self.cells(line)
+        whole = self.width <= len(cells) <= self.width + 1
+        return whole and is_value(cells[self.measured[0]])
+
+    def sampled(self) -> list[int]:
+        """Some lines from the middle and the end, by which the dialect is known."""
+        middle, count = len(self.lines) // 2, len(self.lines)
+        return [*range(middle, min(middle + SAMPLE, count)), *range(max(count - SAMPLE, 0), count)]
+
+
+def found_table(path: Path, text: str, missing: Collection[str]) -> TextTable:
+    """The lines of a text with the separator that makes most cells readable. Raises ImportingError."""
+    numbered = enumerate(text.splitlines(), start=1)
+    lines = [(n, line) for n, line in numbered if line.strip() and not COMMENT.match(line)]
+    table = TextTable(path=path, lines=lines, missing=missing)
+    sampled = table.sampled()
+    tried = [_with_separator(replace(table, separator=separator), sampled) for separator in SEPARATORS]
+    best, values = max(tried, key=lambda pair: pair[1])
+    if not values:
+        number, line = lines[sampled[0]] if sampled else (1, "")
         raise ImportingError(
-            f"{file} has lines of more than {LONGEST_LINE:,} characters: export only the bench's "
-            "channels"
-        )
-    best = max(SEPARATORS, key=lambda separator: _fit(separator, sample))
-    if _fit(best, sample) <= 0:
-        raise ImportingError(
-            f"{file}: no separator and decimal sign make columns of numbers of its lines: export it as "
-            "CSV, one line per sample, with times in seconds or as ISO 8601 (2026-03-01T10:00:00.0005)"
+            f"{path}, line {number}: no separator makes columns of numbers of {line[:40]!r}: export the "
+            "file as CSV, one line per sample, with times in seconds or as 2026-03-01T10:00:00.0005"
         )
     return best
 
 
-def _sample(lines: Sequence[Any]) -> list[Any]:
-    middle = len(lines) // 2
-    return [*lines[middle : middle + SAMPLE], *lines[-SAMPLE:]]
+def _with_separator(table: TextTable, sampled: Sequence[int]) -> tuple[TextTable, int]:
+    """The table with width and columns of its separator, and how many cells are values.
 
-
-def _fit(separator: str, sample: Sequence[str]) -> int:
-    """Cells that hold data; 0 unless nearly all lines are data of two columns or more."""
+    0 unless nearly all lines have two cells or more, half of which can be read.
+    """
     try:
-        rows = [cells_of(line, separator) for line in sample]
+        rows = [table.cells(line) for line in sampled]
     except csv.Error:
-        return 0
-    data = [row for row in rows if len(row) > 1 and is_data(row)]
-    return sum(bool(cell) for row in data for cell in row) if len(data) > 0.8 * len(rows) else 0
+        return table, 0
+    rows = [row for row in rows if len(row) > 1 and 2 * sum(map(table.is_known, row)) >= len(row)]
+    if len(rows) <= 0.8 * len(sampled):
+        return table, 0
+    width = Counter(map(len, rows)).most_common(1)[0][0]
+    usual = [row for row in rows if len(row) == width]
+    values = np.array([[is_value(cell) for cell in row] for row in usual])
+    known = np.array([[table.is_known(cell) for cell in row] for row in usual])
+    measured = np.flatnonzero((np.mean(known, axis=0) >= 0.5) & np.any(values, axis=0))
+    return replace(table, width=width, measured=tuple(measured.tolist())), int(np.sum(values))
 
 
-def read_text(path: Path) -> tuple[str, list[SourceChannel]]:
-    """Every named column of numbers or points in time."""
+def read_text(path: Path, missing: Collection[str] = ()) -> tuple[str, list[SourceChannel]]:
+    """Every named column of numbers or points in time; missing: further marks of missing readings."""
     text, encoding = decoded(str(path), path.read_bytes())
-    lines = [
-        (number, line)
-        for number, line in enumerate(text.splitlines(), start=1)
-        if line.strip() and not COMMENT.match(line)
-    ]
-    separator = found_separator(str(path), [line for _, line in lines])
-    names, units, first = _header(path, lines, separator)
-    data = [line for _, line in lines[first:]]
-    cut = lines[-1][0] if _ends_cut(text, data, separator) else None
-    data = data[:-1] if cut else data
-    sample = "".join(_sample(data))
-    decimal = "," if separator != "," and sample.count(",") > sample.count(".") else "."
-    table: Any = pd.read_csv(
+    table = found_table(path, text, missing)
+    names, units, first = _header(table)
+    stop, told = _end(table, text, first)
+    data = [line for _, line in table.lines[first:stop]]
+    decimal = _decimal(table)
+    frame: Any = pd.read_csv(
         io.StringIO("\n".join(data)),
-        sep=r"\s+" if separator == " " else separator,
+        sep=r"\s+" if table.separator == " " else table.separator,
         decimal=decimal,
         names=list(range(len(names) + 1)),
         index_col=False,
         skipinitialspace=True,
         low_memory=False,
-        na_values=list(MISSING),
+        na_values=[*MISSING, *missing],
     )
-    numbers = [number for number, _ in lines[first:]]
-    beyond: Any = pd.to_numeric(table[len(names)], errors="coerce")
-    if beyond.notna().any():
-        line = numbers[int(beyond.notna().argmax())]
+    lines = np.array([number for number, _ in table.lines[first:stop]])
+    beyond = np.isfinite(np.asarray(pd.to_numeric(frame[len(names)], errors="coerce"), dtype=float))
+    if beyond.any():  # a comment may stand there
         raise ImportingError(
-            f"{path}, line {line} has more than the {len(names)} numbers of the others: mend it, or cut "
-            "the file there"
+            f"{path}, line {lines[beyond.argmax()]} has more than the {table.width} numbers of the "
+            "others: mend it, or cut the file there"
         )
-    shown = {"\t": "tab", " ": "blanks"}.get(separator, f"{separator!r}")
-    told = f"; line {cut} is cut off in its last cell and left out" if cut else ""
-    version = f"text (separator {shown}, decimal {decimal!r}, {encoding}{told})"
-    return version, limited(path, _channels(str(path), numbers, table, names, units))
+    copies = frame.duplicated()
+    if copies.any():
+        told.append(f"{copies.sum()} copies of lines left out, such as line {lines[copies.argmax()]}")
+    shown = {"\t": "tab", " ": "blanks"}.get(table.separator, f"{table.separator!r}")
+    dialect = f"separator {shown}, decimal {decimal!r}, {encoding}"
+    columns = Columns(frame=frame[~copies], lines=lines, decimal=decimal, names=names, units=units)
+    return f"text ({'; '.join([dialect, *told])})", list(columns.channels())
 
 
-def _ends_cut(text: str, data: Sequence[str], separator: str) -> bool:
-    """Whether a file ends within a cell: without an end of line, in one shorter than all above it."""
-    if not text.endswith(data[-1]):
-        return False
-    *above, last = (len(line.rstrip().rpartition(separator)[2]) for line in data)
-    return last < min(above, default=0)
+def _decimal(table: TextTable) -> str:
+    """The decimal sign of most of the sampled cells in which a sign cannot mark thousands."""
+    cells = [cell for line in table.sampled() for cell in table.cells(line) if not is_point(cell)]
+    signs = Counter(found[1] or found[2] for cell in cells if (found := SURE_DECIMAL.fullmatch(cell)))
+    return "," if table.separator != "," and signs[","] > signs["."] else "."
 
 
-def _header(
-    path: Path, lines: Sequence[tuple[int, str]], separator: str
-) -> tuple[list[str], list[str], int]:
-    """Names, units and place of the first line of data; what stands above the names is a preamble."""
-    sample = [cells_of(line, separator) for _, line in _sample(lines)]
-    data = [cells for cells in sample if is_data(cells)]
-    width = Counter(map(len, data)).most_common(1)[0][0]
-    check_number(path, width)
+def _end(table: TextTable, text: str, first: int) -> tuple[int, list[str]]:
+    """Place after the last line of samples, and what is left out below it, in words."""
+    stop = count = len(table.lines)
+    while stop > first and not table.is_sample(stop - 1):
+        stop -= 1
+    if stop < count:
+        numbers = [str(table.lines[k][0]) for k in range(stop, count)]
+        begins = ", ".join(repr(table.cells(k)[0][:20]) for k in range(stop, min(stop + 3, count)))
+        ends = " to ".join(dict.fromkeys((numbers[0], numbers[-1])))
+        return stop, [f"below the samples, line{'s' * (len(numbers) > 1)} {ends} ({begins}) left out"]
+    number, last = table.lines[-1]
+    *above, end = (len(line.rstrip().rpartition(table.separator)[2]) for _, line in table.lines[first:])
+    if text.endswith(last) and end < max(above, default=0):  # a file that was cut, without end of line
+        return stop - 1, [f"line {number} may be cut off in its last cell and is left out"]
+    return stop, []
 
-    def is_row(cells: Sequence[str]) -> bool:
-        return width <= len(cells) <= width + 1 and is_data(cells[:width])  # a comment may follow
 
-    if not is_row(sample[-1]):
-        raise ImportingError(
-            f"{path}, line {lines[-1][0]} has not the {width} numbers of the lines above: delete it if "
-            "it is text or was cut off"
-        )
-    rows = (cells_of(line, separator) for _, line in lines)
-    top = (cells_of(line, separator) for _, line in lines[:SAMPLE])
+def _header(table: TextTable) -> tuple[list[str], list[str], int]:
+    """Names, units and place of the first line of samples; what stands above the names is a preamble."""
+    count = len(table.lines)
+    top = [table.cells(k) for k in range(min(SAMPLE, count))]
     named = next((k for k, row in enumerate(top) if sum(meaning(c) is not None for c in row) > 1), 0)
-    higher = [*islice(rows, named), *takewhile(lambda cells: not is_row(cells), rows)]
-    first, ends_empty = len(higher), not any(cells[-1] for cells in data)
-    above = [row for cells in higher for row in _as_wide(cells, width, ends_empty)]
+    first = next((k for k in range(named, count) if table.is_sample(k)), count)
+    higher = [table.cells(k) for k in range(first)]
+    ends_empty = table.width - 1 not in table.measured
+    above = [row for cells in higher for row in _as_wide(cells, table.width, ends_empty)]
     if not above:
         raise ImportingError(
-            f"{path}, line {lines[first][0]}: no line of {width} names stands above the numbers: "
-            "add a header"
+            f"{table.path}: no line of {table.width} names stands above the numbers: add a header"
         )
     names, units = _names_and_units(above)
-    several = names.count(X_COLUMN) > 1  # LabVIEW's channels have a column of times each
-    for row in higher if several else ():
+    for row in higher if names.count(X_COLUMN) > 1 else ():  # LabVIEW's columns of times have no units
         if row[0] == UNIT_LABEL and len(row) <= len(names) - names.count(X_COLUMN) + 1:
             told = iter(row[1:])
             units = ["" if name == X_COLUMN else next(told, "") for name in names]
         if row[0] == "Time" and len({*filter(None, row[1:])}) > 1:
             raise ImportingError(
-                f"{path}: its channels begin at different times of day ({', '.join(row[1:4])}...): "
-                "export it as TDMS"
+                f"{table.path}: its channels begin at different times of day "
+                f"({', '.join(row[1:4])}...): export it as TDMS"
             )
-    for name, count in Counter(names).items():
-        if name and count > 1 and name != X_COLUMN:
-            raise ImportingError(f"{path}: column {name!r} stands {count} times: rename one of them")
+    for name, times_named in Counter(names).items():
+        if name and times_named > 1 and name != X_COLUMN:
+            raise ImportingError(
+                f"{table.path}: column {name!r} stands {times_named} times: rename one of them"
+            )
     return names, units, first
 
 
@@ -233,59 +231,24 @@ def _as_wide(cells: Sequence[str], width: int, ends_empty: bool) -> list[list[st
 
 
 def _names_and_units(above: Sequence[list[str]]) -> tuple[list[str], list[str]]:
-    """Of the lines above the data: the last of units, and the one of most known names, or else the last.
+    """Of the lines above the data: the one of most units, and the one of most known names, or the last.
 
+    Where that has a title instead of a known name, as "Label" above "TIME", another line has the name.
     Neither units nor types of numbers are names.
     """
-    units = [""] * len(above[0])
-    if len(above) > 1:
-        units = next((row for row in reversed(above) if _are_units(row)), units)
+    units = max(reversed(above), key=lambda row: sum(parsed_unit(cell) is not None for cell in row))
+    units = units if len(above) > 1 and _are_units(units) else [""] * len(units)
     typed = [row for row in above if all(map(TYPES.fullmatch, filter(None, row)))]
     rest = [row for row in above if row is not units and row not in typed]
     rest = [row for row in rest if not _are_units(row)] or rest[-1:] or above[-1:]
-    names = max(reversed(rest), key=lambda row: sum(meaning(cell) is not None for cell in row))
-    return names, ["" if cell == UNIT_LABEL else cell for cell in units]
+    best = max(reversed(rest), key=lambda row: sum(meaning(cell) is not None for cell in row))
+    names = [
+        next((row[k] for row in (best, *rest) if meaning(row[k])), best[k]) for k in range(len(best))
+    ]
+    return names, [unit if column or is_unit(unit) else "" for column, unit in enumerate(units)]
 
 
 def _are_units(cells: Sequence[str]) -> bool:
     """Whether at least half of the filled cells are units."""
     filled = [cell for cell in cells if cell]
     return bool(filled) and sum(is_unit(cell) for cell in filled) * 2 >= len(filled)
-
-
-def _channels(
-    file: str, lines: Sequence[int], table: Any, names: Sequence[str], units: Sequence[str]
-) -> Iterator[SourceChannel]:
-    """The columns; a date goes to the times of day after it, LabVIEW's times to what follows them."""
-    date, time = None, None
-    several = names.count(X_COLUMN) > 1
-    for column, (name, unit) in enumerate(zip(names, units, strict=True)):
-        cells = table[column]
-        first = str(next(iter(cells.dropna()), ""))
-        if name and times.DATE.fullmatch(first):
-            date = cells.astype(str)
-        elif name and times.is_point(first):
-            cells = cells.where(cells.notna(), None)
-            if date is not None and times.CLOCK.match(first):
-                cells = date + " " + cells
-            values, begin = times.seconds(times.points_in_time(f"{file}, {name}", cells))
-            yield SourceChannel(name=name, unit="s", values=values, begin=begin)
-        elif name == X_COLUMN and several:
-            time = _numbers(file, lines, cells, name)
-        elif name:
-            numbers = _numbers(file, lines, cells, name)
-            yield SourceChannel(name=name, unit=unit, values=numbers, time=time)
-
-
-def _numbers(file: str, lines: Sequence[int], cells: Any, name: str) -> Any:
-    """The numbers of a column, (samples,), NaN for a missing one."""
-    texts = cells.astype(str).str.replace(",", ".") if cells.dtype.kind not in "iufb" else cells
-    numbers: Any = pd.to_numeric(texts, errors="coerce")
-    wrong = np.flatnonzero(numbers.isna() & cells.notna())
-    if wrong.size:
-        cell = str(cells.iloc[wrong[0]])[:40]
-        raise ImportingError(
-            f"{file}, line {lines[wrong[0]]}: {name} is {cell!r}, not a number: mend the cell, or cut "
-            "the file there"
-        )
-    return numbers.to_numpy(dtype=float)

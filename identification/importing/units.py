@@ -5,14 +5,13 @@ many ways ("barg", "bar (abs)", "psi gauge"); they are read here and never guess
 """
 
 import re
-from dataclasses import dataclass
 from functools import cache
-from typing import Any
+from typing import Any, NamedTuple
 
 from epv_env.common.units import plain_powers
 from identification.importing.source_file import ImportingError, needed_package
 
-QUANTITIES = {"time": "s", "current": "A", "voltage": "V", "pressure": "Pa", "mass flow": "kg/s"}
+QUANTITIES = {"time": "s", "current": "A", "voltage": "V", "pressure": "Pa"}
 """Quantities of a recording with their SI units."""
 
 EXAMPLES = {**QUANTITIES, "pressure": "bar absolute"}
@@ -46,17 +45,14 @@ ENDLESS = re.compile(r"\d[\d.e]|[\d)²³]\s*(\^|\*\*)|(\^|\*\*)\s*\(")
 """Numbers and powers of powers that no unit needs and that pint may compute for hours."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class PhysicalUnit:
-    """A unit that was understood."""
+class PhysicalUnit(NamedTuple):
+    """A unit that was understood; its quantity is one of QUANTITIES, or "another quantity"."""
 
     text: str
-    """As it was written."""
     quantity: str
-    """One of QUANTITIES, or "another quantity"."""
     size: float
     """[SI]."""
-    reference: str = ""
+    reference: str
     """gauge, absolute, or empty where the text does not say."""
 
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from epv_env.plant.channels import Sensor
-from identification.readings_noise import quantisation_step, rounding_error
+from identification.noise import quantisation_step, rounding_error
+from identification.recordings.plausibility import longest_run
 from identification.recordings.recording import UNITS
-from identification.recordings.recording_checks import longest_run
 
 DRIFT_LEVELS = (0.1, 1.0)
 """Drift over the record, relative to Table 1's accuracy, from which it is in doubt, and bad."""

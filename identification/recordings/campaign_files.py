@@ -21,6 +21,7 @@ from identification.recordings.columns import (
     REQUIRED_COLUMNS,
     SUPPLY_COLUMNS,
     TIME_COLUMN,
+    Place,
     read_columns,
 )
 from identification.recordings.noise import column_steps
@@ -83,7 +84,7 @@ def read_campaign(folder: str | PathLike[str], rules: RecordingRules = RULES) ->
     recordings = []
     for path, role in roles.items():
         sha256, columns = hashlib.sha256(contents[path]).hexdigest(), files[path]
-        period = check_recording(str(path), columns, role, pressure / BAR, steps, rules)
+        period = check_recording(Place(file=str(path)), columns, role, pressure / BAR, steps, rules)
         signals = {
             c.name: np.mean([columns[n] for n in c.columns if n in columns], axis=0) * c.scale
             for c in MEASURED_CHANNELS
@@ -147,15 +148,17 @@ def write_campaign(
     folder: str | PathLike[str],
     *,
     provenance: Mapping[str, Any] | None = None,
+    places: Mapping[str, Place] = {},
 ) -> None:
     """Write a campaign that `read_campaign` takes; its JSON last, so that a part of one is none.
 
     Each file is written whole or not at all, in place of one of the same name. Raises CampaignError,
     before anything is written, if the folder holds a campaign already or a recording breaks a rule.
     provenance: where the recordings come from; campaign.json holds it, and readers ignore it.
+    places: what messages call recordings, by name; the file that is written where one is left out.
     """
     folder = Path(folder)
-    for recording, columns in check_campaign(campaign, folder):
+    for recording, columns in check_campaign(campaign, folder, places):
         template = ",".join(f"%.{DECIMALS[name]}f" for name in columns)
         rows = np.stack(list(columns.values()), axis=1).tolist()
         lines = [",".join(columns), *(template % tuple(row) for row in rows)]
@@ -164,7 +167,9 @@ def write_campaign(
     write_json(folder / FILE_NAME, {**content, "provenance": provenance} if provenance else content)
 
 
-def check_campaign(campaign: Campaign, folder: Path) -> list[tuple[Recording, dict[str, NDArray]]]:
+def check_campaign(
+    campaign: Campaign, folder: Path, places: Mapping[str, Place] = {}
+) -> list[tuple[Recording, dict[str, NDArray]]]:
     """Recordings with their columns, each (samples,), as `write_campaign` would write them.
 
     Nothing is written. Raises CampaignError if the folder holds a campaign already or a rule is broken.
@@ -187,8 +192,9 @@ def check_campaign(campaign: Campaign, folder: Path) -> list[tuple[Recording, di
                 )
     steps = column_steps([columns for _, columns in written], campaign.rules)
     for recording, columns in written:
-        path = str(folder / f"{recording.name}.csv")
-        check_recording(path, columns, recording.role, campaign.pressure / BAR, steps, campaign.rules)
+        written_file = Place(file=str(folder / f"{recording.name}.csv"))
+        place = places.get(recording.name, written_file)
+        check_recording(place, columns, recording.role, campaign.pressure / BAR, steps, campaign.rules)
     return written
 
 

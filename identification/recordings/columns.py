@@ -4,6 +4,8 @@ import io
 import re
 from collections import Counter
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pandas as pd
@@ -37,9 +39,31 @@ MOST_DIGITS = 9
 """Most decimals of a second with which files print times."""
 
 
-def line_number(sample: int) -> int:
-    """Number of a sample's line in its file; the header is line 1."""
+def line_number(sample: Any) -> Any:
+    """Number of a sample's line in its file, or of each of several; the header is line 1."""
     return sample + 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """What messages call a recording and its samples."""
+
+    file: str
+    lines: NDArray | None = None
+    """Line of each sample, (samples,); None: the header is line 1."""
+    period: float | None = None
+    """Between samples [s], where the file has no lines: messages then tell times."""
+
+    def __str__(self) -> str:
+        return self.file
+
+    def samples(self, first: int, last: int | None = None) -> str:
+        """As in "a.csv, lines 3 to 9", or "a.csv, line 3" for one sample."""
+        ends = [first] if last is None else [first, last]
+        if self.period is not None:
+            return f"{self.file}, {' to '.join(f'{end * self.period:.6g}' for end in ends)} s"
+        lines = [line_number(end) if self.lines is None else self.lines[end] for end in ends]
+        return f"{self.file}, line{'s' * (len(lines) - 1)} {' to '.join(map(str, lines))}"
 
 
 def read_columns(
@@ -155,12 +179,11 @@ def _usual_step(file: str, time: NDArray) -> float:
     )
 
 
-def check_rate(file: str, period: float) -> None:
+def check_rate(place: Place, period: float) -> None:
     """Samples follow each other fast enough; period [s]. Raises CampaignError."""
     if period * LEAST_RATE > 1 + 1e-9:
         raise CampaignError(
-            f"{file}, line {line_number(1)}: sampled at {1 / period:g} Hz: record at "
-            f"{LEAST_RATE:g} Hz or faster"
+            f"{place.samples(1)}: sampled at {1 / period:g} Hz: record at {LEAST_RATE:g} Hz or faster"
         )
 
 

@@ -18,8 +18,8 @@ from identification.recordings.campaign_files import (
     named_files,
     read_manifest,
 )
-from identification.recordings.columns import line_number, read_columns, sampling_period
-from identification.recordings.plausibility import SensorFault, check_units, gauge_contradiction
+from identification.recordings.columns import Place, read_columns, sampling_period
+from identification.recordings.plausibility import check_units, gauge_contradiction
 from identification.recordings.recording import HOLD, RULES, CampaignError, RecordingRules
 from identification.recordings.recording_checks import check_range
 
@@ -113,7 +113,7 @@ def read_log(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Log:
         raise faults[0]
     for path, own in columns.items():
         for name in ("U_supply_V", "p1_bar", "p2_bar", "p3_bar", "I_A"):
-            check_range(str(path), name, own[name], rules.sensors[name.split("_")[0]])
+            check_range(Place(file=str(path)), name, own[name], rules.sensors[name.split("_")[0]])
     _check_reference(Path(folder), list(columns.values()), period, pressure / BAR)
     return Log(
         name=manifest.name,
@@ -150,24 +150,21 @@ def _columns(path: Path, period: float) -> dict[str, NDArray]:
 
 def _fault(
     path: str, columns: Mapping[str, NDArray], period: float, ambient: float, rules: RecordingRules
-) -> SensorFault | None:
-    """A fault of a drive's sensors; the diagnosis is to find it, unless all drives have one.
+) -> CampaignError | None:
+    """What many openings of a drive contradict; the diagnosis is to find it, unless all drives do.
 
     A wrong unit or reference contradicts physics in opening after opening, a fault of the valve in few.
-    ambient: p_env [bar absolute]. Raises CampaignError for such readings.
+    ambient: p_env [bar absolute].
     """
     found = list(_openings(columns["coil"], columns["p3_bar"], period))
     checked, told = found[:: len(found) // MOST_CHECKED + 1], list[CampaignError]()
     for part in checked:
         try:
-            check_units("", {name: c[part] for name, c in columns.items()}, period, ambient, rules)
+            place = Place(file=Place(file=path).samples(part.start))
+            check_units(place, {name: c[part] for name, c in columns.items()}, period, ambient, rules)
         except CampaignError as error:
-            reason = str(error).partition(": ")[2].replace("U_V", "U_supply_V")
-            told.append(type(error)(f"{path}, line {line_number(part.start)}: {reason}"))
-    first = told[0] if len(told) > CONTRADICTED * len(checked) else None
-    if first is None or isinstance(first, SensorFault):
-        return first
-    raise first
+            told.append(CampaignError(str(error).replace("U_V", "U_supply_V")))
+    return told[0] if len(told) > CONTRADICTED * len(checked) else None
 
 
 def _check_reference(
@@ -183,10 +180,7 @@ def _check_reference(
     p3 = np.concatenate([own["p3_bar"][part] for own, part in parts])
     on = np.concatenate([own["coil"][part] for own, part in parts]) > 0.0
     for found in gauge_contradiction(p3, on, ambient, LEAST_FALLING):
-        raise CampaignError(
-            f"{folder}: {found}: p1_bar, p2_bar and p3_bar look like gauge pressure: give bar absolute "
-            "(add the environment's pressure)"
-        )
+        raise CampaignError(f"{folder}: {found}: give p1_bar, p2_bar and p3_bar in bar absolute")
 
 
 def _openings(coil: NDArray, p3: NDArray, period: float) -> Iterator[slice]:

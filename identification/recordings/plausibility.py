@@ -1,55 +1,28 @@
-"""Units, references, signs and times of a recording: physics says what is wrong, a table names it.
+"""Units, references, signs and times of a recording: physics says what the readings contradict.
 
 With the coil on and at rest, the open inlet makes p3 equal to p1, and the current is U/R. With the coil
 off, p3 vents through choked flow towards absolute zero at a known rate and ends at ambient pressure; p1
-and p2 do not. A recording that contradicts this is refused. The first misreading of the tables that
-removes every contradiction is named; nothing is converted silently.
+and p2 do not. A recording that contradicts this is refused. Why is not guessed, nothing is converted.
+What a fault of valve, driver or sensor can cause, such as a current that does not end, is left to the
+diagnosis.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise, permutations
+import re
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.recordings.columns import CHANNEL_OF, line_number
+from identification.noise import quantisation_step, white_noise
+from identification.recordings.columns import CHANNEL_OF, Place
 from identification.recordings.recording import RULES, CampaignError, RecordingRules
 
-
-class SensorFault(CampaignError):
-    """Physics contradicts the readings, and no wrong unit, sign, reference or column explains them."""
-
-
-Signals = Mapping[str, NDArray]
-"""Readings by channel, each (samples,) [A, V or bar]."""
-
-PRESSURE_FACTORS: Mapping[str, float] = {
-    "Pa": 1e-5,
-    "mbar": 1e-3,
-    "psi": 0.0689475729,
-    "kPa": 1e-2,
-    "MPa": 10.0,
-    "bar, 100 times too small": 100.0,
-    "bar, 1000 times too small": 1000.0,
-    "bar, 10 times too large": 0.1,
-}
-"""Right value [bar] over reading, by what a column may hold instead; each absolute and gauge."""
-
-VOLTAGE_FACTORS: Mapping[str, float] = {"mV": 1e-3, "kV": 1e3, "a voltage with its sign flipped": -1.0}
-CURRENT_FACTORS: Mapping[str, float] = {
-    "mA": 1e-3,
-    "µA": 1e-6,
-    "kA": 1e3,
-    "a current with its sign flipped": -1.0,
-    "mA with the sign flipped": -1e-3,
-    "A, 10 times too small": 10.0,
-    "A, 10 times too large": 0.1,
-}
-"""The same for voltages [V] and currents [A]."""
-
-TIME_FACTORS: Mapping[str, float] = {"ms": 1e3, "µs": 1e6, "ks": 1e-3}
-"""Printed time over right time, by its unit."""
+CLIPPED_TIME, CLIPPED_SAMPLES = 0.02, 20
+"""A live reading is clipped if it stays at one end for this long [s] and this many samples."""
+LIVE_NOISE, LIVE_CODES = 0.5, 8
+"""Noise of a live channel over the step of its readings, and least number of its other readings: a
+steady pressure in coarse steps has few, and may stay at the least of them."""
 
 SWITCHING_NOISE = 10.0
 """Range of a voltage that switches, over the changes of nine samples in ten; noise has 3."""
@@ -57,8 +30,9 @@ LEAST_VOLTAGE = 1.0 / 6.0
 """Greatest voltage of a coil that is on at all, over the least operating voltage; noise has 0.012 V."""
 MOST_REST_VOLTAGE = 0.1
 """Voltage of a coil that is off, over its voltage when it is on; flyback is shorter than half."""
-MOST_REST_CURRENT = 0.03
-"""Current of a coil that is off, over the sensor's range: three times the accuracy."""
+MOST_REST_CURRENT = 0.5
+"""Current of a coil that is off, over that of one that is on: an eddy current, a leaking driver or an
+offset of the sensor leaves less, readings of another signal more."""
 DECAY_TIME = 0.03
 """Time after which no current flows in a coil that was switched off [s]; six time constants."""
 SENSOR_FAULT = 0.65
@@ -71,71 +45,70 @@ LEAST_DISCHARGE, LEAST_FALL = 20, 0.25
 """Samples (40 ms at 500 Hz) and relative fall of a discharge that shows where the pressure falls to."""
 GAUGE_LIKENESS = 0.3
 """Part of the ambient pressure within which the end of a discharge meets that of a gauge reading."""
-CORRECTED = 0.5
-"""Tolerance of signals that a misreading explains: an offset is no wrong unit."""
 NEARLY_VENTED = 1.5
 """Pressure over ambient below which a circuit counts as vented: an open supply must fill it."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Misreading:
-    """What columns may hold: right value = factor × reading of the source + offset."""
-
-    text: str
-    """What looks wrong, with the remedy."""
-    channels: Sequence[str] = ()
-    """To which factor and offset apply."""
-    factor: float = 1.0
-    offset: float = 0.0
-    source: Mapping[str, str] = field(default_factory=dict)
-    """Channel whose column holds a channel; those left out hold their own."""
-
-    def corrected(self, signals: Signals) -> dict[str, NDArray]:
-        """The signals as they would be without the mistake."""
-        right = {name: signals[self.source.get(name, name)] for name in signals}
-        return right | {name: self.factor * right[name] + self.offset for name in self.channels}
-
-
 def check_units(
-    file: str,
+    place: Place,
     columns: Mapping[str, NDArray],
     period: float,
     ambient_bar: float,
     rules: RecordingRules = RULES,
 ) -> None:
-    """Raise CampaignError if physics contradicts the columns; the message names the likeliest mistake.
+    """Raise CampaignError if physics contradicts the columns, with the first contradiction.
 
     Args:
-        file: what messages call the recording.
+        place: what messages call the recording and its samples.
         columns: by the file's column names, each (samples,) in the unit of the name.
         period: between samples [s].
         ambient_bar: p_env [bar absolute].
     """
     names = {"U": "U_V", "I": "I_A"}
-    _refuse(
-        file,
-        names,
-        {name: columns[column] for name, column in names.items()},
-        lambda s, _: _electrical(s["U"], s["I"], period, rules),
-        [
-            *_exchanges(names),
-            *_scales(names, ("U",), VOLTAGE_FACTORS, "V"),
-            *_scales(names, ("I",), CURRENT_FACTORS, "A"),
-        ],
-        rules,
-    )
+    _refuse(place, names, _electrical(columns["U_V"], columns["I_A"], period, rules))
     on = energised_samples(columns["U_V"], rules)
     for supply in (column for column, name in CHANNEL_OF.items() if name == "p1" and column in columns):
         names = {"p1": supply, "p2": "p2_bar", "p3": "p3_bar"}
-        _refuse(
-            file,
-            names,
-            {name: columns[column] for name, column in names.items()},
-            lambda s, tolerance: _pressures(s, on, ambient_bar, tolerance, rules),
-            _pressure_misreadings(names, ambient_bar),
-            rules,
-        )
-    _check_venting(file, columns["p3_bar"], on, period, ambient_bar, rules)
+        pressures = {name: columns[column] for name, column in names.items()}
+        _refuse(place, names, _pressures(pressures, on, ambient_bar, rules))
+    _check_venting(place, columns["p3_bar"], on, period, ambient_bar, rules)
+
+
+def _refuse(place: Place, names: Mapping[str, str], contradictions: Iterator[str]) -> None:
+    """Raise CampaignError with the first contradiction; names: the columns of its channels."""
+    for found in contradictions:
+        blamed = [column for name, column in names.items() if re.search(rf"\b{name}\b", found)]
+        columns = ", ".join(blamed or names.values())
+        raise CampaignError(f"{place}: {found}: check unit, reference, sign and sensor of {columns}")
+
+
+def clipped(values: NDArray, period: float) -> tuple[int, int] | None:
+    """First and last sample at which a live channel (samples,) stays at its own end; None: at neither.
+
+    Noise moves its other readings. A channel in coarse steps, or at rest at 0, may stay. period: [s].
+    """
+    for end in (np.max(values), np.min(values)):
+        first, count = longest_run(values == end)
+        pieces = np.split(values, np.flatnonzero(np.diff(values == end)) + 1)
+        others = [piece for piece in pieces if piece[0] != end]
+        if (
+            end != 0.0
+            and count >= max(CLIPPED_SAMPLES, CLIPPED_TIME / period - 1e-6)
+            and len(np.unique(values)) > LIVE_CODES
+            and white_noise(others) > LIVE_NOISE * quantisation_step(others)
+        ):
+            return first, first + count - 1
+    return None
+
+
+def longest_run(mask: NDArray) -> tuple[int, int]:
+    """First index and length of the longest run of true in a boolean array (samples,)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
+    lengths = edges[1::2] - edges[::2]
+    if not lengths.size:
+        return 0, 0
+    longest = int(np.argmax(lengths))
+    return int(edges[2 * longest]), int(lengths[longest])
 
 
 def switches(U: NDArray) -> bool:
@@ -153,90 +126,6 @@ def energised_samples(U: NDArray, rules: RecordingRules = RULES) -> NDArray:
     return (0.5 * greatest < U) & (greatest > LEAST_VOLTAGE * rules.operating_voltages[0])
 
 
-def _refuse(
-    file: str,
-    names: Mapping[str, str],
-    signals: Signals,
-    contradictions: Callable[[Signals, float], Iterator[str]],
-    misreadings: Sequence[Misreading],
-    rules: RecordingRules,
-) -> None:
-    """Raise CampaignError with the first contradiction, and the misreading that explains all.
-
-    contradictions: of signals, with the tolerance as a share of the sensors' accuracy.
-    """
-    found = next(contradictions(signals, 1.0), None)
-    if found is None:
-        return
-    beyond = {n for n, values in signals.items() if np.max(np.abs(values)) > rules.sensors[n].high}
-    explaining = (
-        m
-        for m in misreadings
-        if (abs(m.factor) >= 1 or beyond & set(m.channels))  # small units make large readings
-        and next(contradictions(m.corrected(signals), CORRECTED), None) is None
-    )
-    columns = ", ".join(names.values())
-    named = next((m.text for m in explaining), None)
-    likely = named or f"check unit, sign and sensor of {columns}"
-    last = line_number(len(next(iter(signals.values()))) - 1)
-    sign = ";" if ": " in likely else ":"
-    error = CampaignError if named else SensorFault
-    raise error(f"{file}, lines {line_number(0)} to {last}: {found}{sign} {likely}")
-
-
-def _exchanges(names: Mapping[str, str]) -> list[Misreading]:
-    """Columns that changed places, two before three."""
-    found = []
-    for order in permutations(names):
-        source = {name: other for name, other in zip(names, order, strict=True) if name != other}
-        if source:
-            held = ", ".join(f"{names[other]} holds {name}" for name, other in source.items())
-            columns = " and ".join(names[name] for name in source)
-            text = f"{columns} look swapped ({held}): rename the columns"
-            found.append(Misreading(text=text, source=source))
-    return sorted(found, key=lambda misreading: len(misreading.source))
-
-
-def _scales(
-    names: Mapping[str, str],
-    channels: Sequence[str],
-    factors: Mapping[str, float],
-    unit: str,
-    offset: float = 0.0,
-) -> list[Misreading]:
-    """Wrong units and signs of some channels; offset: what to add after scaling [unit]."""
-    columns = " and ".join(names[name] for name in channels)
-    looks = f"{columns} {'looks' if len(channels) == 1 else 'look'} like"
-    found = []
-    for text, factor in factors.items():
-        scaled = f"divide by {1 / factor:g}" if abs(factor) < 1 else f"multiply by {factor:g}"
-        steps = [scaled] if factor != 1.0 else []
-        steps += ["add the environment's pressure"] if offset > 0 else []
-        steps += ["subtract the environment's pressure once"] if offset < 0 else []
-        gauge = ", gauge" if offset > 0 and factor != 1.0 else ""
-        text = f"{looks} {text}{gauge}: give {unit} ({', then '.join(steps)})"
-        found.append(Misreading(text=text, channels=channels, factor=factor, offset=offset))
-    return found
-
-
-def _pressure_misreadings(names: Mapping[str, str], ambient: float) -> list[Misreading]:
-    """Wrong units, references and columns, the usual ones first; ambient [bar]."""
-    device = [tuple(names)]  # one that measures all of them
-    single = [(name,) for name in names]
-    added = {"absolute pressure to which the ambient was added": 1.0}
-    tables = (
-        ([*single, *device], PRESSURE_FACTORS, 0.0),
-        ([*device, *single], {"gauge pressure": 1.0}, ambient),
-        ([*device, *single], added, -ambient),
-        ([*device, *single], PRESSURE_FACTORS, ambient),
-    )
-    found = _exchanges(names)
-    for groups, factors, offset in tables:
-        for channels in groups:
-            found += _scales(names, channels, factors, "bar absolute", offset)
-    return found
-
-
 def _starting_state(energised: NDArray) -> slice:
     """Samples before the coil, boolean (samples,), first switches."""
     changes = np.flatnonzero(np.diff(energised))
@@ -250,12 +139,11 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
     low, high = rules.operating_voltages
     level = float(np.median(U[start]))
     if switches(U) and not np.any(on):
-        yield f"U switches at {np.max(np.abs(U)):.4g} V, and {low:g} to {high:g} V are usual"
+        yield f"U switches at {U[np.argmax(np.abs(U))]:.4g} V, and {low:g} to {high:g} V are usual"
     if switches(current) and not np.any(on):
-        yield f"I switches at {np.max(np.abs(current)):.4g} A, and the voltage never does"
+        yield f"I switches at {current[np.argmax(np.abs(current))]:.4g} A, and the voltage never does"
     if not on[0] and abs(level) > rules.sensors["U"].margin:
         yield f"the voltage is {level:.4g} V, neither off nor on"
-    settled = current[start]
     if on[0]:
         if not low <= level <= high:
             yield f"the energised coil has {level:.4g} V, and {low:g} to {high:g} V are usual"
@@ -270,23 +158,24 @@ def _electrical(U: NDArray, current: NDArray, period: float, rules: RecordingRul
                 f"{level:.4g} V and a holding current of {held:.4g} A make {resistance:.4g} ohm, and "
                 f"coils have {least:g} to {greatest:g} ohm"
             )
-        samples = np.arange(len(on))
-        off_since = samples - np.maximum.accumulate(np.where(on, samples, -1))
-        settled = current[off_since * period > DECAY_TIME]
-    rest = float(np.median(settled)) if len(settled) else 0.0
-    if abs(rest) > MOST_REST_CURRENT * rules.sensors["I"].high:
-        yield f"a current of {rest:.4g} A flows while the coil is off"
+    samples = np.arange(len(on))
+    off_since = samples - np.maximum.accumulate(np.where(on, samples, -len(on)))
+    settled = current[off_since * period > DECAY_TIME]
+    if np.any(on) and len(settled):
+        rest, held = float(np.median(settled)), float(np.median(current[on]))
+        if abs(rest) > MOST_REST_CURRENT * abs(held):
+            yield f"a current of {rest:.4g} A flows while the coil is off, and {held:.4g} A while on"
 
 
 def _pressures(
-    signals: Signals, on: NDArray, ambient: float, tolerance: float, rules: RecordingRules
+    signals: Mapping[str, NDArray], on: NDArray, ambient: float, rules: RecordingRules
 ) -> Iterator[str]:
-    """What p1, p2 and p3 cannot be.
+    """What p1, p2 and p3, each (samples,) [bar], cannot be.
 
-    on: whether the coil is, boolean (samples,). ambient: p_env [bar absolute]. tolerance: a share of the
-    sensors' accuracy.
+    on: whether the coil is, boolean (samples,). ambient: p_env [bar absolute].
     """
-    margin = tolerance * rules.pressure_margin
+    margin = rules.pressure_margin
+    yield from gauge_contradiction(signals["p3"], on, ambient)
     least, most = {}, {}
     for name, values in signals.items():  # a hundredth of the samples may have a fault of another kind
         least[name], most[name] = (float(q) for q in np.quantile(values, (0.01, 0.99)))
@@ -303,9 +192,7 @@ def _pressures(
         if p1 > p2 + 2 * margin:
             yield f"at rest, p1 is {p1:.4g} and p2 {p2:.4g} bar, although the open valve joins them"
         return
-    # A misreading has to explain the difference without a faulty sensor beside it.
-    allowed = 2 * margin if tolerance < 1 else max(2 * margin, SENSOR_FAULT)
-    if abs(p1 - p3) > allowed:
+    if abs(p1 - p3) > max(2 * margin, SENSOR_FAULT):
         yield f"with the coil on, p1 is {p1:.4g} and p3 {p3:.4g} bar, although the open inlet joins them"
     if p2 > p1 + 2 * margin:
         yield f"the circuit's p2 of {p2:.4g} bar lies above its supply p1 of {p1:.4g} bar"
@@ -320,7 +207,6 @@ def _pressures(
     rise = most["p2"] - p2
     if fall > 0.35 and p2 < NEARLY_VENTED * ambient and rise < 2 * margin:
         yield f"p2 rises by only {rise:.2g} bar from {p2:.4g}, although the valve opens"
-    yield from gauge_contradiction(signals["p3"], on, ambient)
 
 
 def gauge_contradiction(
@@ -337,7 +223,7 @@ def gauge_contradiction(
         late = [slice((2 * part.start + part.stop) // 3, part.stop) for part in discharges]
         ends = [_median_end(p3, parts) for parts in (discharges, late)]
         if all(abs(end + ambient) < GAUGE_LIKENESS * ambient for end in ends):
-            yield f"p3 vents towards {ends[0]:.2f} bar, and choked flow leads towards 0 bar absolute"
+            yield f"p3 vents towards {ends[0]:.2f} bar as gauge pressure does, not towards 0 bar"
 
 
 def _discharges(p3: NDArray, on: NDArray, ambient: float, least: int = LEAST_DISCHARGE) -> list[slice]:
@@ -371,7 +257,7 @@ def _median_end(p3: NDArray, parts: Sequence[slice]) -> float:
 
 
 def _check_venting(
-    file: str, p3: NDArray, on: NDArray, period: float, ambient: float, rules: RecordingRules
+    place: Place, p3: NDArray, on: NDArray, period: float, ambient: float, rules: RecordingRules
 ) -> None:
     """The control chamber vents at a rate that its exhaust and volume allow, or the times are wrong."""
     discharges = _discharges(p3, on, ambient)
@@ -381,15 +267,7 @@ def _check_venting(
     rate, (least, greatest) = float(np.median(slopes)) / -period, rules.venting_rates
     if least <= rate <= greatest:
         return
-    factor = rules.usual_venting / rate
-    units = [text for text, size in TIME_FACTORS.items() if 0.3 * size < factor < 3 * size]
-    size = f"{factor:.2g} times too long" if factor > 1 else f"{1 / factor:.2g} times too short"
-    likely = (
-        f"time_s looks like {units[0]}: give s"
-        if units
-        else f"time_s looks {size}: give the true sampling rate in s, or another valve's --plant"
-    )
     raise CampaignError(
-        f"{file}, line {line_number(discharges[0].start)}: p3 vents at {rate:.3g} 1/s, and this valve "
-        f"at {least:g} to {greatest:g}; {likely}"
+        f"{place}: p3 vents at {rate:.3g} 1/s, and this valve at {least:g} "
+        f"to {greatest:g}: check unit and rate of time_s, or give another valve's --plant"
     )

@@ -93,6 +93,10 @@ VENTING_SYMBOLS = ("alphaMV", "dMVexh", "V3")
 """Parameters that decide how fast the control chamber vents."""
 
 
+USUAL_VENTING = 7.7
+"""Rate of a choked discharge of the report's valve [1/s]."""
+
+
 @dataclass(frozen=True, kw_only=True)
 class RecordingRules:
     """What a bench and its valve allow; the defaults are those of the report's."""
@@ -107,8 +111,6 @@ class RecordingRules:
     venting_rates: tuple[float, float] = (4.5, 14.0)
     """Rates of a choked discharge of p3 [1/s]. The report's valve has 7.7, and 2300 recordings of
     benches with every effect lie between 5.6 and 9.8. Outside, the times are wrong."""
-    usual_venting: float = 7.7
-    """Rate of a choked discharge of the valve [1/s]; it names the factor of wrong times."""
 
     @property
     def pressure_margin(self) -> float:
@@ -167,7 +169,7 @@ def rules_of(plant: Plant) -> RecordingRules:
         venting_rate(p.replace(**dict(zip(VENTING_SYMBOLS, values, strict=True))))
         for values in product(*ends)
     ]
-    slowest, fastest = (rate / RULES.usual_venting for rate in RULES.venting_rates)
+    slowest, fastest = (rate / USUAL_VENTING for rate in RULES.venting_rates)
     R, voltage = p["R"], plant.sensors["U"]
     least, greatest = RULES.coil_resistances
     middle = (least * greatest) ** 0.5
@@ -179,5 +181,4 @@ def rules_of(plant: Plant) -> RecordingRules:
         ),
         coil_resistances=(least * R / middle, greatest * R / middle),
         venting_rates=(slowest * min(rates), fastest * max(rates)),
-        usual_venting=venting_rate(p),
     )

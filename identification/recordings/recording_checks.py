@@ -14,22 +14,19 @@ from epv_env.plant.channels import Sensor
 from identification.recordings.columns import (
     CHANNEL_OF,
     TIME_COLUMN,
+    Place,
     check_rate,
-    line_number,
     sampling_period,
 )
-from identification.recordings.plausibility import check_units, switches
+from identification.recordings.plausibility import check_units, clipped, switches
 from identification.recordings.recording import HOLD, RULES, CampaignError, RecordingRules
 
 LEAST_REST = 0.5
 """Least duration of a quality recording [s]; statistics of less mean little."""
 
-STUCK_TIME, STUCK_SAMPLES = 0.02, 20
-"""A reading is stuck if it stays at the end of a range for this long [s] and this many samples."""
-
 
 def check_recording(
-    file: str,
+    place: Place,
     columns: Mapping[str, NDArray],
     role: str,
     ambient_bar: float,
@@ -39,7 +36,7 @@ def check_recording(
     """Apply every rule to a recording's columns; returns the sampling period [s].
 
     Args:
-        file: what messages call the recording.
+        place: what messages call the recording and its samples.
         columns: by the file's column names, each (samples,) in the unit of the name.
         role: one of recording.ROLES.
         ambient_bar: p_env [bar absolute].
@@ -48,7 +45,7 @@ def check_recording(
 
     Raises CampaignError at the first rule that is broken.
     """
-    period = sampling_period(file, columns[TIME_COLUMN])
+    period = sampling_period(place.file, columns[TIME_COLUMN])
     sensors = {name: rules.sensors[c] for name, c in CHANNEL_OF.items() if name in columns}
     for name in sensors:
         # The supply may read the same in coarse steps, and any pressure of a steady record.
@@ -57,89 +54,86 @@ def check_recording(
             values = columns[name]
             if np.min(values) == np.max(values):
                 raise CampaignError(
-                    f"{file}, {_lines(0, len(values))}: {name} is {values[0]:g} throughout, and noise "
-                    "moves every live channel: check its sensor, or give simulated data the sensors' "
-                    "noise"
+                    f"{place.samples(0, len(values) - 1)}: {name} is {values[0]:g} throughout, and "
+                    "noise moves every live channel: check its sensor, or give simulated data noise"
                 )
     if role != "quality" and not switches(columns["U_V"]):
-        _check_length(file, len(columns["U_V"]), role, period)
         U = columns["U_V"]
+        _check_length(place, len(U), role, period)
         raise CampaignError(
-            f"{file}, {_lines(0, len(U))}: U_V never switches, it stays between {np.min(U):g} and "
+            f"{place.samples(0, len(U) - 1)}: U_V never switches, it stays between {np.min(U):g} and "
             f"{np.max(U):g} V: record a switching of the coil, or give the recording the role quality"
         )
-    check_units(file, columns, period, ambient_bar, rules)
-    check_rate(file, period)
-    _check_length(file, len(columns["U_V"]), role, period)
+    check_units(place, columns, period, ambient_bar, rules)
+    check_rate(place, period)
+    _check_length(place, len(columns["U_V"]), role, period)
     for name, sensor in sensors.items():
-        check_range(file, name, columns[name], sensor)
-        # A vented chamber in coarse steps stays at the low end.
-        vented = name in steps and abs(ambient_bar - sensor.low) <= sensor.margin
-        _check_rail(file, name, columns[name], sensor, period, low_end=not vented)
+        check_range(place, name, columns[name], sensor)
+        if name != "U_V":
+            check_clipped(place, name, columns[name], period)
     if role != "quality":
-        _check_energised_start(file, columns["U_V"], period)
+        _check_energised_start(place, columns["U_V"], period)
         for name, sensor in sensors.items():
             if name != "U_V":
-                _check_steady_start(file, name, columns[name], sensor, period)
+                _check_steady_start(place, name, columns[name], sensor, period)
     return period
 
 
-def _check_length(file: str, samples: int, role: str, period: float) -> None:
+def _check_length(place: Place, samples: int, role: str, period: float) -> None:
     """A recording holds its steady start and more; one for statistics LEAST_REST."""
     needed = _samples(LEAST_REST, period) if role == "quality" else _samples(HOLD, period) + 1
     if samples < needed:
         raise CampaignError(
-            f"{file}, line {line_number(samples)}: the file ends after {samples} samples, and a {role} "
+            f"{place.samples(samples - 1)}: the file ends after {samples} samples, and a {role} "
             f"recording at {1 / period:g} Hz needs at least {needed}: record for longer"
         )
 
 
-def check_range(file: str, name: str, values: NDArray, sensor: Sensor) -> None:
+def check_range(place: Place, name: str, values: NDArray, sensor: Sensor) -> None:
     """Values (samples,) lie in Table 1's range, but for the accuracy."""
     margin = sensor.margin + 1e-9
     outside = (values < sensor.low - margin) | (values > sensor.high + margin)
     if np.any(outside):
         sample = int(np.argmax(outside))
         raise CampaignError(
-            f"{file}, line {line_number(sample)}: {name} is {values[sample]:g}, outside the sensor's "
+            f"{place.samples(sample)}: {name} is {values[sample]:g}, outside the sensor's "
             f"range [{sensor.low:g}, {sensor.high:g}] by more than its accuracy of "
             f"{sensor.margin:g}: check unit and scaling, or cut the recording there"
         )
 
 
-def _check_rail(
-    file: str, name: str, values: NDArray, sensor: Sensor, period: float, *, low_end: bool
-) -> None:
-    """No reading stays at an end of the range, or where the ADC saturates."""
-    at_end = (low_end & (values <= sensor.low)) | (values >= sensor.high - sensor.resolution)
-    first, length = longest_run(at_end[1:] & (values[1:] == values[:-1]))
-    if length >= max(_samples(STUCK_TIME, period), STUCK_SAMPLES):
+def check_clipped(place: Place, name: str, values: NDArray, period: float) -> None:
+    """No reading stays where a range ends, of the sensor or of what records it."""
+    found = clipped(values, period)
+    if found is not None:
+        first, last = found
+        end = "greatest" if values[first] == np.max(values) else "least"
         raise CampaignError(
-            f"{file}, {_lines(first, length + 1)}: {name} is stuck at {values[first]:g}, an end of the "
-            f"sensor's range [{sensor.low:g}, {sensor.high:g}]: check the sensor, or record again with "
-            "signals inside the range"
+            f"{place.samples(first, last)}: {name} stays at {values[first]:g}, its {end} reading, for "
+            f"{1e3 * (last + 1 - first) * period:g} ms, and noise moves the others, so its range ends "
+            "there: record again with a greater range, or leave the recording out"
         )
 
 
-def _check_energised_start(file: str, U: NDArray, period: float) -> None:
+def _check_energised_start(place: Place, U: NDArray, period: float) -> None:
     """The coil is on for HOLD before it first switches."""
     off = np.flatnonzero(0.5 * np.max(U) >= U[: _samples(HOLD, period)])
     if off.size:
         raise CampaignError(
-            f"{file}, line {line_number(off[0])}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} "
+            f"{place.samples(int(off[0]))}: U_V is {U[off[0]]:g} V at {1e3 * off[0] * period:g} "
             f"ms, and recordings start energised for at least {1e3 * HOLD:g} ms: record from before "
             "the first switching"
         )
 
 
-def _check_steady_start(file: str, name: str, values: NDArray, sensor: Sensor, period: float) -> None:
+def _check_steady_start(place: Place, name: str, values: NDArray, sensor: Sensor, period: float) -> None:
     """Current and pressures rest during HOLD: first and last quarter agree within the accuracy."""
     start = values[: _samples(HOLD, period)]
     quarter = len(start) // 4
     change = float(np.mean(start[-quarter:]) - np.mean(start[:quarter]))
     if abs(change) > sensor.margin:
         raise CampaignError(
-            f"{file}, {_lines(0, len(start))}: {name} changes by {change:g} in the first "
+            f"{place.samples(0, len(start) - 1)}: {name} changes by {change:g} in the first "
             f"{1e3 * HOLD:g} ms, which must be steady: let the bench settle, energised, before "
             "recording"
         )
@@ -148,17 +142,3 @@ def _check_steady_start(file: str, name: str, values: NDArray, sensor: Sensor, p
 def _samples(duration: float, period: float) -> int:
     """Samples that a duration [s] holds."""
     return int(np.ceil(duration / period - 1e-6))
-
-
-def _lines(first: int, count: int) -> str:
-    return f"lines {line_number(first)} to {line_number(first + count - 1)}"
-
-
-def longest_run(mask: NDArray) -> tuple[int, int]:
-    """First index and length of the longest run of true in a boolean array (samples,)."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(int)))
-    lengths = edges[1::2] - edges[::2]
-    if not lengths.size:
-        return 0, 0
-    longest = int(np.argmax(lengths))
-    return int(edges[2 * longest]), int(lengths[longest])

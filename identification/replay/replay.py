@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.channels import readings
-from epv_env.plant.effects.registry import effect_constants, has_effects
+from epv_env.plant.effects.registry import effect_constants, kernel_of
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
@@ -60,11 +60,12 @@ class Replay:
         each = {shift: np.zeros(n) for shift in SHIFTS}
         each |= {s: np.asarray(value) for s, value in candidates.items()}
         largest = {s: v if v.ndim == 1 else np.max(np.abs(v), axis=1) for s, v in each.items()}
-        with_effects = np.broadcast_to(has_effects(effect_constants({**self.base, **largest})), n)
-        if np.all(with_effects) or not np.any(with_effects):
+        kernel = np.broadcast_to(kernel_of(effect_constants({**self.base, **largest})), n)
+        needed = np.unique(kernel)
+        if len(needed) == 1:
             return self._outputs(each, n, chosen)
         answers = [np.empty((len(OUTPUTS), len(self.drives[r].U), n)) for r in chosen]
-        for part in (with_effects, ~with_effects):  # each by its own kernel
+        for part in (kernel == number for number in needed):
             own = self._outputs({s: v[part] for s, v in each.items()}, int(np.sum(part)), chosen)
             for whole, some in zip(answers, own, strict=True):
                 whole[:, :, part] = some

@@ -151,13 +151,13 @@ def test_random_numbers_are_those_of_the_published_generator():
     np.testing.assert_allclose(np.cov(drawn.T), np.eye(4), atol=0.04)
 
 
-@pytest.mark.parametrize("with_effects", [False, True], ids=["nominal", "with effects"])
-def test_the_kernels_compile_for_an_accelerator(with_effects, monkeypatch):
+@pytest.mark.parametrize("kernel", [0, 1, 2], ids=["nominal", "with effects", "with laws"])
+def test_the_kernels_compile_for_an_accelerator(kernel, monkeypatch):
     task = made("ordinary", "cpu").task
     b, r = Batch.of(task), blank_results(task.n)
     actions, limits = np.zeros(task.n), np.zeros(task.n, dtype=np.int64)
     arguments = (b, b, r, rules_of(task.settings), actions, 1, limits, INSTEAD)
-    assert compiles(step_kernel(OnOff.rule, with_effects), arguments, monkeypatch)
+    assert compiles(step_kernel(OnOff.rule, kernel), arguments, monkeypatch)
     for kind in (np.int64, np.float32, np.bool_):
         strided = np.zeros((task.n, 2), dtype=kind)[:, 0]
         assert compiles(copy_actions, (strided, actions), monkeypatch)

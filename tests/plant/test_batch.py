@@ -5,6 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
+from epv_env.plant.effects.law import KNOTS, placed
+from epv_env.plant.effects.registry import PLACES
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.simulate import energised
@@ -105,11 +107,14 @@ def test_extremes_are_those_of_the_trajectory():
 
 def test_trajectory_is_the_same_beside_valves_with_other_effects():
     (p, start), u = fleet(), inputs()
-    effects = np.where(np.arange(N) % 3 == 0, 2e-4, 0.0)
-    mixed = run(({**p, "a2": effects}, start), u, np.arange(N))
-    for a2 in (0.0, 2e-4):
-        same = run(({**p, "a2": a2}, start), u, np.arange(N))
-        np.testing.assert_array_equal(mixed[:, :, effects == a2], same[:, :, effects == a2])
+    law = placed(3, PLACES["local_gas_speed"], "p2", 5e5, 9e5, (0.5,) * KNOTS)
+    others = [{**law, "law3_effect": 0.0}, {**law, "law3_effect": 0.0, "a2": 2e-4}, {**law, "a2": 2e-4}]
+    group = np.arange(N) % len(others)
+    own = {s: np.array([each.get(s, 0.0) for each in others])[group] for s in others[-1]}
+    mixed = run(({**p, **own}, start), u, np.arange(N))
+    for number, each in enumerate(others):
+        same = run(({**p, **each}, start), u, np.arange(N))
+        np.testing.assert_array_equal(mixed[:, :, group == number], same[:, :, group == number])
 
 
 def test_a_valve_that_was_given_up_is_not_tried_again():

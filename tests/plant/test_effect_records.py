@@ -9,7 +9,7 @@ import pytest
 import epv_env.plant
 from epv_env.plant.effects.law import SLOTS, Terms
 from epv_env.plant.effects.record import Constant, Effect, EffectError, Size
-from epv_env.plant.effects.registry import CONSTANTS, EFFECTS, LAWFUL
+from epv_env.plant.effects.registry import CONSTANTS, EFFECTS
 from epv_env.plant.parameters import Parameters, table
 
 PLANT = Path(epv_env.plant.__file__).parent
@@ -30,8 +30,7 @@ def source(folder: Path, pattern: str = "*.py") -> str:
 def unread_constants(constants: tuple[Constant, ...]) -> list[str]:
     """Constants that no compiled function reads; `with_laws` reads those of laws by their names."""
     text = source(PLANT) + re.sub(r"name=\S+", "", source(PLANT / "effects"))
-    read_by_name = [*Terms._fields, *(f"on_{name}" for name in LAWFUL.values())]
-    text += " ".join(f".law{slot}_{name}" for slot in SLOTS for name in read_by_name)
+    text += " ".join(f".law{slot}_{name}" for slot in SLOTS for name in ("effect", *Terms._fields))
     text += ".coil_start"  # it sets the state at the start
     return [row.name for row in constants if not re.search(rf"\.{row.name}\b", text)]
 

@@ -12,7 +12,7 @@ from epv_env.plant.effects.coil import COOLING_TIME, COPPER
 from epv_env.plant.effects.flows import FILLING_TIME
 from epv_env.plant.effects.law import KNOTS, placed
 from epv_env.plant.effects.movers import STRIBECK_SPEED, stribeck
-from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, has_effects
+from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, kernel_of
 from epv_env.plant.equations import (
     Coefficients,
     Inputs,
@@ -68,10 +68,10 @@ def test_an_effect_fades_with_its_size(name):
 
 
 def test_sizes_of_zero_are_no_effects():
-    assert not np.any(has_effects(effect_constants(CALIBRATED)))
+    assert not np.any(kernel_of(effect_constants(CALIBRATED)))
     for name in CATALOGUE:
         if name not in OUTSIDE:
-            assert np.all(has_effects(effect_constants(sized(name, 0.1)))), name
+            assert np.all(kernel_of(effect_constants(sized(name, 0.1)))), name
 
 
 def assert_scipy_agrees(p: Parameters) -> None:
@@ -95,9 +95,10 @@ def test_the_kernel_agrees_with_scipy_on_every_effect(name):
     assert_scipy_agrees(sized(name, 0.3))
 
 
-def test_the_kernel_agrees_with_scipy_on_a_law():
+@pytest.mark.parametrize("slot", [1, 4], ids=["usual kernel", "kernel with many laws"])
+def test_the_kernel_agrees_with_scipy_on_a_law(slot):
     """An eddy current that fades with p3 acts on the coil's rate and on the current that is read."""
-    law = placed(1, PLACES["eddy_current"], "p3", 1e5, 12e5, tuple(np.linspace(1.0, -0.5, KNOTS)))
+    law = placed(slot, PLACES["eddy_current"], "p3", 1e5, 12e5, tuple(np.linspace(1.0, -0.5, KNOTS)))
     assert_scipy_agrees(sized("eddy_current", 0.3).replace(**law))
 
 
@@ -148,6 +149,29 @@ def test_a_saturating_magnet_with_remanence_conserves_energy():
     linkage_rate = (linkage(i + d, x) - linkage(i - d, x)) / (2 * d) * rate
     linkage_rate += (linkage(i, x + d) - linkage(i, x - d)) / (2 * d) * v
     assert linkage_rate == pytest.approx(U - p["R"] * current, rel=1e-6)
+
+
+@pytest.mark.parametrize("w_sat", [0.0, 0.6, 1.0, 1.5])
+def test_the_inductance_bends_at_a_knee_and_the_emf_belongs_to_the_force(w_sat):
+    """dI/dt = (U - R I - v dF/dI)/L: the EMF of motion is the force's derivative by the current."""
+    p = CALIBRATED.replace(sMV=9e3, w_sat=w_sat)
+    c, e = Coefficients(*coefficients(p)[:, 0]), Effects(*effect_constants(p)[:, 0])
+
+    def magnet(current, v=0.0, U=24.0):
+        q = dict.fromkeys(State._fields, 0.0) | {"p1": 1e5, "p2": 1e5, "p3": 1e5}
+        q |= {"xMV": 3e-4, "vMV": v, "I": current}
+        return np.array(_magnet(State(**q), Inputs(U, 0.0, 0.0, 0.0), c, e))
+
+    current, d = 0.4, 1e-5
+    at_rest, moving, steps = magnet(current), magnet(current, v=0.3), magnet(current, U=25.0)
+    inductance = 1.0 / (steps - at_rest)[0]
+    reluctance = p["RML"] + (p["xMVmax"] - 3e-4) / (p["mu0"] * np.pi / 4 * p["dMB"] ** 2)
+    u = p["sMV"] * p["N"] * current / reluctance
+    steepness = (1 - w_sat) * (1 + u) ** 2 + w_sat * (1 + 16 * u**4)
+    assert inductance == pytest.approx(p["N"] ** 2 / reluctance / steepness, rel=1e-9)
+    emf = (at_rest - moving)[0] * inductance / 0.3
+    slope = (magnet(current + d) - magnet(current - d))[1] / (2 * d)
+    assert emf == pytest.approx(slope, rel=1e-6)
 
 
 def released_inductance(p: Parameters) -> float:

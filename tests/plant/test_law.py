@@ -61,12 +61,32 @@ def test_growth_is_linear_between_its_knots_and_constant_beyond(argument, slot):
     np.testing.assert_allclose(found, np.maximum(expected, -1.0), rtol=0, atol=1e-9)
 
 
-@pytest.mark.parametrize("growths", [(0.5,), (0.25, 0.2)], ids=["one law", "two laws"])
-def test_a_constant_law_is_a_larger_effect(growths):
+@pytest.mark.parametrize("growths", [(0.5,), (0.25, 0.2), (0.25, 0.6, 0.2, -0.375)], ids=len)
+def test_constant_laws_are_a_larger_effect_by_the_product_of_their_factors(growths):
     p = CALIBRATED.replace(F_PV=4.0)
     for slot, constant in enumerate(growths, start=1):
         p = p.replace(**law("piston_friction", growth=KNOTS * (constant,), slot=slot))
-    np.testing.assert_allclose(openings(p), openings(CALIBRATED.replace(F_PV=6.0)), rtol=1e-9)
+    np.testing.assert_allclose(
+        openings(p), openings(CALIBRATED.replace(F_PV=6.0)), rtol=1e-9, atol=1e-12
+    )
+
+
+@pytest.mark.parametrize("slot", SLOTS[1:])
+def test_a_law_acts_alike_in_every_slot(slot):
+    p = CALIBRATED.replace(F_PV=4.0)
+    first, other = (openings(p.replace(**law("piston_friction", slot=s))) for s in (1, slot))
+    assert np.max(np.abs(first - openings(p))) > 1e3
+    np.testing.assert_allclose(other, first, rtol=1e-9, atol=1e-12)
+
+
+@pytest.mark.parametrize(("used", "further"), [(1, 2), (3, 4)], ids=["usual kernel", "many laws"])
+def test_a_further_law_of_an_effect_that_is_off_changes_nothing_to_the_bit(used, further):
+    p = CALIBRATED.replace(F_PV=4.0)
+    for slot in range(1, used + 1):
+        p = p.replace(**law("piston_friction", list(ARGUMENTS)[2 * slot], slot=slot))
+    idle = law("flow_force", "xPV", KNOTS * (-0.5,), slot=further)  # growth would shorten steps
+    found = openings(p.replace(**idle))
+    np.testing.assert_array_equal(found, openings(p))
 
 
 def each_with_its_law(growth: float, changed: dict[str, Any]) -> np.ndarray:
@@ -94,14 +114,16 @@ def test_a_law_multiplies_the_strengths_of_its_effect_and_nothing_else(name):
     every = {symbol: size for other in LAWFUL for symbol, size in trial(other).items()}
     e = Effects(*effect_constants({**CALIBRATED, **every, **law(name, growth=KNOTS * (0.5,))})[:, 0])
     expected = {strength: 1.5 * getattr(e, strength) for strength in effect(name).strength}
-    found = with_laws(State(*[0.0] * len(State._fields)), e)
+    found = with_laws(State(*[0.0] * len(State._fields)), e, True)
     assert all(expected.values())
     assert found._asdict() == {**e._asdict(), **expected}
 
 
 def test_laws_travel_in_a_plant_file_and_act_in_the_environment(tmp_path):
     path, last, own = tmp_path / "plant.json", [], CALIBRATED.replace(F_PV=8.0, cflow=0.5)
-    for p in (own, own.replace(**law("piston_friction"), **law("flow_force", "xPV", slot=2))):
+    laws = law("piston_friction") | law("flow_force", "xPV", slot=2) | law("flow_force", "p2", slot=3)
+    laws |= law("piston_friction", "|vPV|", slot=4)
+    for p in (own, own.replace(**laws)):
         save_plant(Plant(parameters=p, region=Region(centre=p)), path)
         assert dict(load_plant(path).parameters) == dict(p)
         env = gym.make("EPValve-v0", plant=path, parameters="exact")
@@ -114,8 +136,8 @@ def test_laws_travel_in_a_plant_file_and_act_in_the_environment(tmp_path):
     ("laws", "message"),
     [
         ([GIVEN | {"unit": "bar"}], r"laws\[0\]: .*'p3' in 'bar' is unknown: choose one of p1"),
-        ([GIVEN | {"effect": "rust"}], "law of 'rust': choose one of armature_friction"),
-        ([GIVEN] * 3, "laws has 3 entries: give at most 2"),
+        ([GIVEN | {"effect": "rust"}], "law of 'rust': choose one of armature_bounce"),
+        ([GIVEN] * 5, "laws has 5 entries: give at most 4"),
         ([GIVEN | {"growth": [0.1] * 8}], r"laws\[0\]: .*give low < high and 9 numbers as growth"),
         ([GIVEN | {"growth": [9.0] * 9}], r"law1_1 = 9 1 is outside its domain \[-3, 3\].*give a value"),
     ],

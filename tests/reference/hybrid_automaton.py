@@ -11,12 +11,12 @@ from numpy.typing import ArrayLike, NDArray
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.coil import OFF_VOLTAGE, coil_current
 from epv_env.plant.effects.measurement import command_delays
-from epv_env.plant.effects.registry import effect_constants, has_effects, with_laws
+from epv_env.plant.effects.registry import Effects, effect_constants, kernel_of, with_laws
 from epv_env.plant.equations import Coefficients, Inputs, State, derivative
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at, store_state
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.primitives import FLAGS, source_digest
-from epv_env.plant.stepping import STICK_SPEED
+from epv_env.plant.stepping import MOST_RESTITUTION, STICK_SPEED
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -112,7 +112,7 @@ def _terminal_currents(digest: str) -> TerminalCurrents:
         c, e = coefficients_at(coefficients, 0, 0), effects_at(effects, 0, 0)
         for k in range(out.size):
             q = state_at(states, 0, k)
-            out[k] = coil_current(U, q.I, c.R, q.coil_heat, with_laws(q, e))
+            out[k] = coil_current(U, q.I, c.R, q.coil_heat, with_laws(q, e, True))
         return out
 
     return terminal_currents
@@ -176,11 +176,11 @@ class HybridAutomaton:
         c = coefficients(schedule.parameters, schedule.reservoir_volume)
         e = effect_constants(schedule.parameters)
         self.coefficients, self.effects = c, e
-        self.right_hand_side = right_hand_side or COMPILED_RIGHT_HAND_SIDES[bool(np.any(has_effects(e)))]
+        self.right_hand_side = right_hand_side or COMPILED_RIGHT_HAND_SIDES[bool(np.any(kernel_of(e)))]
         self.inputs = np.zeros(len(Inputs._fields))
         named = Coefficients(*c[:, 0])
         self.stroke = (named.xPVmax, named.xMVmax)
-        self.restitution = (named.ePV, named.eMV)
+        self.ePV = named.ePV
         self.kinks = {"inlet kink": named.kink_in, "exhaust kink": named.kink_exh}
         self.mode = [FREE, FREE]
         self.evaluations, self.most_evaluations = 0, most_evaluations
@@ -217,7 +217,9 @@ class HybridAutomaton:
 
         y: state (states,) [SI], changed in place.
         """
-        rebound = -self.restitution[mover] * y[SPEEDS[mover]]
+        acting = with_laws(State(*y), Effects(*self.effects[:, 0]), True)
+        restitution = (self.ePV, min(acting.restitution_MV, MOST_RESTITUTION))[mover]
+        rebound = -restitution * y[SPEEDS[mover]]
         y[POSITIONS[mover]] = stop
         y[SPEEDS[mover]] = rebound if abs(rebound) > STICK_SPEED else 0.0
 

@@ -113,7 +113,10 @@ class Body:
     def translated(self) -> tuple[str, CFunction]:
         """The function's text, and how to call it."""
         body = self.block(self.tree.body, "    ")
-        done = CFunction(name=self.PREFIX + self.python.__name__, result=self.result or "void")
+        name = self.PREFIX + self.python.__name__
+        taken = {known.name for _, known in self.c.functions.values()}
+        unique = name if name not in taken else f"{name}_{len(taken)}"
+        done = CFunction(name=unique, result=self.result or "void")
         passed = [declared for name in self.given for declared in self.declared(name)]
         variables = "".join(f"    {kind} {self.begun(name)};\n" for name, kind in self.locals.items())
         names = [each.rpartition(" ")[2].lstrip("*") for each in passed]

@@ -12,7 +12,7 @@ from numba import cuda
 from numpy.typing import NDArray
 
 from controllers.base import decides_on_device
-from epv_env.device.kernels import WITH_EFFECTS, Batch, episodes_kernel, launch
+from epv_env.device.kernels import KERNEL, Batch, episodes_kernel, launch
 from epv_env.device.vector_env import on_device
 from epv_env.period import rules_of
 from epv_env.settings import Settings
@@ -53,8 +53,8 @@ def run_begun(
     """
     if not decides_on_device(controller):
         raise OptionError(f'{controller.name} decides on the processor: leave out the device "cuda"')
-    with_effects = bool(np.any(begun.numbers[WITH_EFFECTS]))
-    kernel = episodes_kernel(type(controller).decide, controller.record, count, with_effects)
+    number = int(np.max(begun.numbers[KERNEL]))
+    kernel = episodes_kernel(type(controller).decide, controller.record, count, number)
     meters, kept = cuda.to_device(np.zeros(len(begun.keys), METER)), cuda.to_device(record)
     launch(kernel, min(lanes, len(begun.keys)), on_device(begun), cuda.to_device(rules_of(settings)),
            on_device(controller.constants), cuda.to_device(np.zeros(1, controller.record)),

@@ -54,7 +54,7 @@ LEVEL_RATIO = 2.0
 """Largest Froelich level that gives the force of a Langevin level, relative to it [-]."""
 
 _with_electric = replacing(
-    Effects, "eddy", "U_clamp", "U_drop", "saturation", "force_saturation", "I_rem", "friction_MV",
+    Effects, "eddy", "U_clamp", "U_drop", "saturation", "I_rem", "friction_MV",
     "inlet_area", "exhaust_area",
 )  # fmt: skip
 _with_gas = replacing(
@@ -66,7 +66,7 @@ _with_piston = replacing(
 )
 _with_supply = replacing(State, "p1")
 _with_drop = replacing(State, "supply_drop")
-_with_saturation = replacing(Effects, "saturation", "force_saturation")
+_with_saturation = replacing(Effects, "saturation")
 _with_rates = replacing(State, "vMV", "coil_heat", "I", "supply_drop")
 
 
@@ -83,7 +83,6 @@ def _solenoid_sizes(q, u, c, e, d):
         e.U_clamp * (1.0 + d * (abs(q.I) / 0.3 - 1.0)),  # a diode's or Zener's slope resistance
         e.U_drop * (1.0 + d * (abs(q.I) / steady - 1.0)),  # part of the drop is resistive
         e.saturation * saturated,  # iron stays linear longer, then bends sharper
-        e.force_saturation * saturated,
         e.I_rem * (1.0 + d * closed),  # an open gap demagnetises
         e.friction_MV * (1.0 + d * (abs(q.vMV) / 0.3 - 1.0)),  # a viscous share
         e.inlet_area * (1.0 - d * closed),  # an open seat's jet sucks
@@ -266,7 +265,7 @@ def _compile(digest: str):
             q = _with_drop(q, instant_drop(q, inputs, valve, fitted, d))
         deviating = deviating_sizes(q, inputs, valve, fitted, d)
         size = langevin_size(q, valve, deviating) if langevin else deviating.saturation
-        sizes = _with_saturation(deviating, size, size) if langevin else deviating
+        sizes = _with_saturation(deviating, size) if langevin else deviating
         rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
         slowed = rates.vMV - d * film_rate(q, valve) * q.vMV * free_MV
         cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT

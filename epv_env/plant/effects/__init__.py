@@ -5,7 +5,7 @@ the line of equations.py that calls its function behind `if extended is not None
 reads the record: the parameter table, the plant file, the catalogue of the diagnosis, sealed trials,
 sweeps and docs.
 
-The kernels of integrate.py come in two forms compiled from the same source: `extended=None`, where
-every effect is compiled away and costs nothing, and `extended=True`, where each acts with its size and
-a size of zero is off.
+The kernels of integrate.py come in forms compiled from the same source: `extended=None`, where every
+effect is compiled away and costs nothing; `extended=FEW_LAWS`, where each acts with its size and a size
+of zero is off; and `extended=True`, where more laws may act.
 """

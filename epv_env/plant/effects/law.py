@@ -3,26 +3,27 @@
 The catalogue assumes a law for each mechanism: friction that does not depend on the pressure, a leak
 that flows like a nozzle. In a real valve the mechanism may follow another law. Then the strength of the
 effect, one of the constants that its equations read, becomes strength x (1 + g(a)): a is an argument,
-such as p3, and g is linear between nine knots and constant beyond them. Two laws may act at once, on one
-effect or on two; their factors multiply.
+such as p3, and g is linear between nine knots and constant beyond them. Four laws may act at once, each
+on any effect; the factors of those on one effect multiply.
 """
 
 from collections import namedtuple
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.effects.record import Constant, Effect, Size
-from epv_env.plant.primitives import Value, inlined
+from epv_env.plant.primitives import Value, generated, inlined
 
 KNOTS = 9
 """Knots: what a smooth law of physics needs, since it bends once or twice."""
 
-SLOTS = (1, 2)
+SLOTS = (1, 2, 3, 4)
 """Numbers of the laws that may act at once."""
 
 MOST_GROWTH = 3.0
@@ -46,11 +47,8 @@ ARGUMENTS = {
     "|lag_2|": ("Pa", {"lag_2": 1.0}),
     "|lag_3|": ("Pa", {"lag_3": 1.0}),
 }
-"""Unit of an argument, and its weights in the state. The last seven are states of effects: so a strength
-may follow the size of what the effect does."""
-
-PARTS = tuple(dict.fromkeys(part for _, weights in ARGUMENTS.values() for part in weights))
-"""States that arguments are made of; those between bars count by magnitude."""
+"""Unit of an argument, and its weights in the state; between bars stands a magnitude. The last seven are
+states of effects: so a strength may follow the size of what the effect does."""
 
 
 def knot_symbols(slot: int) -> tuple[str, ...]:
@@ -152,24 +150,17 @@ def arguments_of(q: Any) -> dict[str, NDArray]:
 
 
 Terms = namedtuple(
-    "Terms", [*(f"by_{part}" for part in PARTS), "first", *(f"bend_{k}" for k in range(KNOTS))]
+    "Terms", ["argument", "per_interval", "first", *(f"bend_{knot}" for knot in range(KNOTS))]
 )
-"""A law as the equations use it, each a row of the kernel's table: by_PART, knots per unit of a part of
-the argument [1/SI]; first, the argument at the first knot [intervals]; bend_0, g there [1], and the
-changes of its slope at the knots [1/interval]."""
+"""A law as the equations use it, each a row of the kernel's table: argument, its place in ARGUMENTS from
+1 on; per_interval, knots per unit of it [1/SI]; first, the argument at the first knot [intervals];
+bend_0, g there [1], and the changes of its slope at the knots [1/interval]."""
 
 
 def _per_interval(slot: int, p: Mapping[str, NDArray]) -> NDArray:
     """Knots per unit of the argument; 0 without a law."""
     width = (p[f"law{slot}_high"] - p[f"law{slot}_low"]) / (KNOTS - 1)
     return np.where(width > 0.0, 1.0 / np.maximum(width, 1e-9), 0.0)
-
-
-def _by(slot: int, part: str, p: Mapping[str, NDArray]) -> NDArray:
-    """Knots per unit of a part of the argument."""
-    weights = enumerate((weights.get(part, 0.0) for _, weights in ARGUMENTS.values()), start=1)
-    place = p[f"law{slot}_argument"]
-    return sum(np.where(place == k, w, 0.0) for k, w in weights if w) * _per_interval(slot, p)
 
 
 def _first(slot: int, p: Mapping[str, NDArray]) -> NDArray:
@@ -186,23 +177,14 @@ def _bend(slot: int, knot: int, p: Mapping[str, NDArray]) -> Value:
     return slope - (g[knot - 1] - g[knot - 2]) if knot > 1 else slope
 
 
-def _acts_on(slot: int, place: int, p: Mapping[str, NDArray]) -> NDArray:
-    """1 where the law acts on an effect, else 0."""
-    return np.where(p[f"law{slot}_effect"] == float(place), 1.0, 0.0)
-
-
-def constants(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
-    """Rows of the kernel's table, of each law those of Terms. effects: the catalogue."""
+def constants() -> tuple[Constant, ...]:
+    """Rows of the kernel's table: of each law the place of its effect, and those of Terms."""
     values: dict[str, Callable[[Mapping[str, NDArray]], Value]] = {}
     for slot in SLOTS:
-        values |= {f"law{slot}_by_{part}": partial(_by, slot, part) for part in PARTS}
+        values |= {s: itemgetter(s) for s in place_symbols(slot)[:2]}
+        values[f"law{slot}_per_interval"] = partial(_per_interval, slot)
         values[f"law{slot}_first"] = partial(_first, slot)
         values |= {f"law{slot}_bend_{k}": partial(_bend, slot, k) for k in range(KNOTS)}
-        values |= {
-            f"law{slot}_on_{effect.name}": partial(_acts_on, slot, place)
-            for place, effect in enumerate(effects, start=1)
-            if effect.strength
-        }
     return tuple(Constant(name, value, is_size=False) for name, value in values.items())
 
 
@@ -223,15 +205,27 @@ def bent(s, bend):
     return max(s, 0.0) * bend
 
 
+def _written(name: str, weights: Mapping[str, float]) -> str:
+    """An argument of a state q as the equations have it."""
+    text = " + ".join(f"{weight!r} * q.{part}" for part, weight in weights.items())
+    return f"abs({text})" if name.startswith("|") else f"({text})"
+
+
+argument_at = generated(
+    "argument_at",
+    "q, place",
+    "return " + " + ".join(
+        f"(place == {float(place)!r}) * {_written(name, weights)}"
+        for place, (name, (_, weights)) in enumerate(ARGUMENTS.items(), start=1)
+    ),
+)  # fmt: skip
+"""The argument with a place in ARGUMENTS, from 1 on, at a state q [SI]; 0 for place 0."""
+
+
 @inlined
 def growth(q, law):
     """g at a state, at least -1 [1]; law: Terms."""
-    s = law.by_p1 * q.p1 + law.by_p2 * q.p2 + law.by_p3 * q.p3 + law.by_xPV * q.xPV
-    s += law.by_vPV * abs(q.vPV) + law.by_xMV * q.xMV + law.by_vMV * abs(q.vMV) + law.by_I * q.I
-    s += law.by_coil_heat * q.coil_heat + law.by_heat_3 * q.heat_3 + law.by_heat_2 * q.heat_2
-    s += law.by_supply_drop * q.supply_drop + law.by_far_pressure * abs(q.far_pressure)
-    s += law.by_lag_2 * abs(q.lag_2) + law.by_lag_3 * abs(q.lag_3)
-    s = min(max(s - law.first, 0.0), 8.0)
+    s = min(max(law.per_interval * argument_at(q, law.argument) - law.first, 0.0), 8.0)
     near = bent(s, law.bend_1) + bent(s - 1.0, law.bend_2) + bent(s - 2.0, law.bend_3)
     near += bent(s - 3.0, law.bend_4)
     far = bent(s - 4.0, law.bend_5) + bent(s - 5.0, law.bend_6) + bent(s - 6.0, law.bend_7)

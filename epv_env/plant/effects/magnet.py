@@ -2,26 +2,37 @@
 
 from collections.abc import Mapping
 
+import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.primitives import QUARTER_PI, inlined
 
 
+@inlined
+def steepness(u, knee):
+    """Reciprocal of the differential inductance relative to that of linear iron [-].
+
+    u: level of saturation. knee: w_sat. (1 + u)^2 is that of the Froelich-Kennelly curve.
+    """
+    curve = (1.0 + u) * (1.0 + u)
+    return curve + knee * (1.0 + 16.0 * u * u * u * u - curve)
+
+
 def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
     """Greatest reciprocal of the coil's differential inductance [1/H], shape as the parameters."""
     reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
-    level = p["sMV"] * p["N"] * (1 + p["wL_sat"]) / p["RML"]  # at 1 A, the end of Table 1's range
-    return reluctance / p["N"] ** 2 * (1 + level) ** 2
+    level = p["sMV"] * p["N"] / p["RML"]  # at 1 A, the end of Table 1's range
+    return reluctance / p["N"] ** 2 * np.maximum(steepness(level, p["w_sat"]), 1.0)
 
 
 MAGNETIC_SATURATION = Effect(
     name="magnetic_saturation",
     component="solenoid",
-    strength=("saturation", "force_saturation"),
+    strength=("saturation",),
     form=(
         "Φ = N I/(Rm + N I sMV); force from its coenergy, N² I²/(Rm² μ0 A) (ln(1+u) − u/(1+u))/u², "
-        "u = sMV N I/Rm"
+        "u = sMV N I/Rm; 1/L = Rm/N² ((1 − w_sat)(1+u)² + w_sat (1 + 16 u⁴))"
     ),
     source="Fröhlich 1881, Kennelly 1891; iron saturates at 1.6–2 T, that is 1.3–1.6·10⁻⁴ V s over A_MB",
     sizes=(
@@ -34,25 +45,18 @@ MAGNETIC_SATURATION = Effect(
             drawn=(8e2, 8e3),
         ),
         Size(
-            symbol="wF_sat",
+            symbol="w_sat",
             unit="1",
-            domain=(-1, 1),
-            meaning="how much more than by the curve's law the force saturates; -1: not at all",
-            spread=0.5,
-        ),
-        Size(
-            symbol="wL_sat",
-            unit="1",
-            domain=(-1, 0),
-            meaning="the same for the inductance, which saturates no more than that",
-            spread=0.5,
+            domain=(0, 1.5),
+            meaning="how far the inductance falls beyond a knee instead of by the curve",
+            spread=1.0,
         ),
     ),
     constants=(
         # turns over the saturation flux: with I/Rm, how far the iron saturates [1/(V s)]
-        Constant("saturation", lambda p: p["sMV"] * p["N"] * (1 + p["wL_sat"])),
-        # the same, as far as the force feels it [1/(V s)]
-        Constant("force_saturation", lambda p: p["sMV"] * p["N"] * (1 + p["wF_sat"])),
+        Constant("saturation", lambda p: p["sMV"] * p["N"]),
+        # how sharply the inductance bends [-]
+        Constant("saturation_knee", lambda p: p["w_sat"], is_size=False),
     ),
     fastest_rate=lambda p: p["R"] * inverse_inductance(p),
 )

@@ -67,11 +67,13 @@ PISTON_FRICTION = Effect(
 ARMATURE_BOUNCE = Effect(
     name="armature_bounce",
     component="armature",
-    form="speed after a landing = −eMV times that before; rebounds below 5 mm/s end (integrate.py)",
+    strength=("restitution_MV",),
+    form="speed after a landing = −eMV times that before; rebounds below 5 mm/s end (stepping.py)",
     source="coefficient of restitution; docs/explanation/plant-model.md, correction 8",
     sizes=(
         Size(
             symbol="eMV",
+            constant="restitution_MV",
             unit="1",
             domain=(0, 0.95),
             meaning="restitution of the armature at its stops",

@@ -1,9 +1,11 @@
 """The catalogue of effects, and the table of constants that the kernels read."""
 
 from collections import namedtuple
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
+from typing import Any
 
 import numpy as np
+from numba.extending import overload
 from numpy.typing import ArrayLike, NDArray
 
 from epv_env.plant.effects import (
@@ -16,10 +18,9 @@ from epv_env.plant.effects import (
     movers,
     seats,
 )
-from epv_env.plant.effects.law import growth
 from epv_env.plant.effects.record import Effect, EffectError
 from epv_env.plant.effects.step_limits import step_limits
-from epv_env.plant.primitives import generated, inlined
+from epv_env.plant.primitives import INLINED, generated, inlined
 
 EFFECTS: tuple[Effect, ...] = (
     coil.COIL_HEATING,
@@ -61,7 +62,7 @@ PLACES = {name: place for place, name in enumerate(CATALOGUE, start=1)}
 
 CONSTANTS = (
     *(row for effect in EFFECTS for row in effect.rows),
-    *law.constants(EFFECTS),
+    *law.constants(),
     *step_limits(EFFECTS),
 )
 """Rows of the kernel's table of effects."""
@@ -72,34 +73,59 @@ Effects.__doc__ = "Constants of the effects as the equations use them (CONSTANTS
 LAWFUL = {name: record.name for record in EFFECTS for name in record.strength}
 """Effect of each constant that a law multiplies."""
 
-_first_law, _second_law = (
-    generated(
-        f"law_{slot}",
-        "e",
-        f"return Terms({', '.join(f'e.law{slot}_{name}' for name in law.Terms._fields)})",
-        Terms=law.Terms,
-    )
-    for slot in law.SLOTS
-)
+Factors = namedtuple("Factors", dict.fromkeys(LAWFUL.values()))
+Factors.__doc__ = "What laws multiply the strengths of each effect by [1]."
 
-_scaled = generated(
-    "scaled",
-    "e, g1, g2",
-    "return Effects(" + ", ".join(
-        f"e.{name} * (1.0 + e.law1_on_{LAWFUL[name]} * g1) * (1.0 + e.law2_on_{LAWFUL[name]} * g2)"
-        if name in LAWFUL else f"e.{name}"
+
+def _strengthened(
+    slots: tuple[int, ...], decorator: Callable[..., Any] = inlined
+) -> Callable[..., Effects]:
+    """`with_laws` of the laws with these numbers."""
+    growths = [f"g{slot}" for slot in slots]
+    acting = "(1.0 + (e.law{0}_effect == {1}.0) * g{0})"
+    factors = [
+        " * ".join(acting.format(slot, PLACES[name]) for slot in slots) for name in Factors._fields
+    ]
+    strengths = [
+        f"e.{name} * by_effect.{LAWFUL[name]}" if name in LAWFUL else f"e.{name}"
         for name in Effects._fields
-    ) + ")",
-    Effects=Effects,
-)  # fmt: skip
+    ]
+    terms = [", ".join(f"e.law{slot}_{name}" for name in law.Terms._fields) for slot in slots]
+    lines = [
+        *(f"law_{slot} = Terms({each})" for slot, each in zip(slots, terms, strict=True)),
+        f"by_effect = factors(e, {', '.join(f'growth(q, law_{slot})' for slot in slots)})",
+        "return scaled(e, by_effect)",
+    ]
+    factors_of = generated(
+        "factors", ", ".join(["e", *growths]), f"return Factors({', '.join(factors)})", Factors=Factors
+    )
+    scaled = generated(
+        "scaled", "e, by_effect", f"return Effects({', '.join(strengths)})", Effects=Effects
+    )
+    return generated(
+        "with_laws", "q, e, extended", "\n    ".join(lines), decorator,
+        Terms=law.Terms, growth=law.growth, factors=factors_of, scaled=scaled,
+    )  # fmt: skip
 
 
-@inlined
-def with_laws(q, e):
-    """The constants whose strengths follow their laws at a state q; e: Effects."""
-    first = _first_law(e)
-    second = _second_law(e)
-    return _scaled(e, growth(q, first), growth(q, second))
+FEW_LAWS = law.SLOTS[:2]
+"""Numbers of the laws for which the usual kernel has room: more of them slow it down."""
+
+
+def _by_slots(every: Callable[..., Effects]) -> Callable[..., Effects]:
+    """In compiled code, `with_laws` of few laws where the type of `extended` says so."""
+    few = _strengthened(FEW_LAWS)
+
+    @overload(every, jit_options=INLINED, strict=False)
+    def chosen(q, e, extended):
+        return few if getattr(extended, "count", 0) == len(FEW_LAWS) else every
+
+    return every
+
+
+with_laws = _strengthened(law.SLOTS, _by_slots)
+"""The constants whose strengths follow their laws at a state q; e: Effects. extended: FEW_LAWS where no
+others are in use, else True."""
 
 
 def effect(name: str) -> Effect:
@@ -117,7 +143,13 @@ def effect_constants(p: Mapping[str, ArrayLike]) -> NDArray:
     return np.ascontiguousarray(np.broadcast_arrays(*np.atleast_1d(*rows)), dtype=float)
 
 
-def has_effects(constants: NDArray) -> NDArray:
-    """Which valves have an effect switched on, boolean (n,); constants: (rows of Effects, n)."""
-    sizes = [values for row, values in zip(CONSTANTS, constants, strict=True) if row.is_size]
-    return np.any(np.asarray(sizes) != 0, axis=0)
+def kernel_of(constants: NDArray) -> NDArray:
+    """Which kernel of `integrate.KERNELS` each valve needs, (n,); constants: (rows of Effects, n).
+
+    0: no effect is switched on. 1: effects with FEW_LAWS at most. 2: effects with more laws.
+    """
+    rows = dict(zip(CONSTANTS, constants, strict=True))
+    has_effects = np.any([values != 0 for row, values in rows.items() if row.is_size], axis=0)
+    further = [f"law{slot}_effect" for slot in law.SLOTS if slot not in FEW_LAWS]
+    many_laws = np.any([values != 0 for row, values in rows.items() if row.name in further], axis=0)
+    return np.where(has_effects, 1 + many_laws, 0)

@@ -12,7 +12,9 @@ smooth and a polynomial in 1 - r replaces both powers; `MAX_RELATIVE_ERROR` boun
 """
 
 import hashlib
+import linecache
 import math
+from itertools import count
 from pathlib import Path
 from typing import Any, TypeAlias
 
@@ -23,7 +25,10 @@ from numpy.polynomial import Polynomial, chebyshev
 
 FLAGS = {"fastmath": {"nnan", "ninf", "nsz", "contract", "arcp"}, "error_model": "numpy"}
 
-inlined = register_jitable(forceinline=True, no_cfunc_wrapper=True, **FLAGS)
+INLINED: Any = {"forceinline": True, "no_cfunc_wrapper": True, **FLAGS}
+"""Options of a function that the kernels absorb."""
+
+inlined = register_jitable(**INLINED)
 """Decorator for the small functions that the kernels absorb."""
 
 exact = register_jitable(forceinline=True, no_cfunc_wrapper=True, error_model="numpy")
@@ -48,11 +53,20 @@ def wide_vectors(typing_context=None):
 def generated(name: str, arguments: str, body: str, decorator=inlined, **names):
     """An inlined function from source text: one expression per field, so that no field is typed twice.
 
-    LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory.
+    LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory. `inspect`
+    finds the text, as the export to C needs it.
     """
-    namespace = dict(names)
-    exec(f"def {name}({arguments}):\n    {body}\n", namespace)
+    text, file, namespace = (
+        f"def {name}({arguments}):\n    {body}\n",
+        f"<{name} {next(_number)}>",
+        {**names},
+    )
+    linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
+    exec(compile(text, file, "exec"), namespace)
     return decorator(namespace[name])
+
+
+_number = count()
 
 
 def replacing(kind, *fields: str):

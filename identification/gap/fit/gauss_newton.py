@@ -18,9 +18,9 @@ from identification.gap.fit.variable_projection import (
 )
 from identification.gap.plant import noise_weighted
 
-MOST_DAMPING = 1e6
-"""Greatest damping of Levenberg and Marquardt, relative to the diagonal [1]; a fit ends at a tenth of
-it, where a step is too short to gain anything."""
+FIRST_DAMPING, LEAST_DAMPING, MOST_DAMPING = 0.1, 1e-6, 1e6
+"""Damping of Levenberg and Marquardt relative to the diagonal [1]: nearly none at first, as starts are
+expected to be close; a fit ends at the greatest, where a step is too short to gain anything."""
 
 
 def linearise(
@@ -173,6 +173,7 @@ def fit(
     starts: Sequence[Estimate],
     rival_chi_square: float = np.inf,
     iterations: int = 20,
+    precision: float = 1.0,
 ) -> list[Estimate]:
     """Fit every start to the fitted runs, until each fit has converged or is given up.
 
@@ -182,10 +183,12 @@ def fit(
         rival_chi_square: least chi-square of earlier fits against which these compete [1].
         iterations: most of them, for computing time; a fit that needs more is weighed as it is and
             reported as not converged.
+        precision: decrease of chi-square at which a fit ends, relative to that at which nothing that
+            is judged changes [1].
     """
     if not starts:
         return []
-    searches = [_Search(problem, start) for start in starts]
+    searches = [_Search(problem, start, precision) for start in starts]
     active = searches
     for _ in range(iterations + 1):
         linearised = linearise(problem, [search.trial for search in active], problem.fitted_runs)
@@ -201,11 +204,11 @@ def fit(
 class _Search:
     """The fit of one hypothesis."""
 
-    def __init__(self, problem: FittingProblem, start: Estimate):
-        self.problem = problem
+    def __init__(self, problem: FittingProblem, start: Estimate, precision: float):
+        self.problem, self.precision = problem, precision
         self.best = start
         self.trial = start
-        self.damping = 0.1  # nearly none, as starts are expected to be close
+        self.damping = FIRST_DAMPING
         self.equations: NormalEquations | None = None
 
     def advance(self, runs: Sequence[LinearisedRun], rival_chi_square: float) -> None:
@@ -221,14 +224,14 @@ class _Search:
             self.trial, self.equations = self.best, None
             return
         else:
-            self.damping = min(10.0 * self.damping + 1e-6, MOST_DAMPING)  # Marquardt 1963
+            self.damping = min(10.0 * self.damping, MOST_DAMPING)  # Marquardt 1963
             current = self.equations
         step, decrease = current.step(*self.problem.ends(self.best), self.damping)
-        self.trial = replace(self.best, vector=self.best.vector + step)
+        self.trial = replace(self.best, vector=self.best.vector + step, steps=self.best.steps + 1)
         self._decide(decrease, rival_chi_square)
 
     def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
-        self.damping = max(0.2 * self.damping, 1e-9)
+        self.damping = max(self.damping / 10.0, LEAST_DAMPING)
         self.equations = equations
         # Run parameters of the causes take the step as well; run offsets stay linear.
         run_values = self.trial.run_values.copy()
@@ -243,12 +246,12 @@ class _Search:
         excess = self.best.chi_square - readings
         # A decrease of 0.3 changes no odds, and a cause that leaves much need not be fitted to the last
         # digit.
-        enough = max(0.3, 1e-3 * excess)
+        enough = self.precision * max(0.3, 1e-3 * excess)
         # A rival is far better; noise is not known to the percent.
         hopeless = 3.0 * max(rival_chi_square - readings, 0.0) + 0.05 * readings
         self.best = replace(
             self.best,
-            converged=bool(decrease < enough or self.damping >= 0.1 * MOST_DAMPING),
+            converged=bool(decrease < enough or self.damping == MOST_DAMPING),
             # Steps of a nonlinear model gain more than they predict at first.
             given_up=bool(excess - 3.0 * decrease > hopeless),
         )

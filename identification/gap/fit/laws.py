@@ -23,8 +23,8 @@ SD, LENGTH = 0.5, 0.35
 """Standard deviation of g [1], as laws of one mechanism differ by half, and the length over which it
 changes, relative to the range of the state [1]: a line or a parabola, but no ripple."""
 
-MOST_LAWS = 2
-"""Most laws that are open at once: of two causes, or over two states of one."""
+MOST_LAWS, MOST_OF_CAUSE = 4, 2
+"""Most laws that are open at once, in all and of one cause: a mechanism follows one or two states."""
 
 KEPT_VARIANCE = 0.97
 """Share of the prior's variance that the components hold [1]."""

@@ -11,6 +11,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+RIDGE = 1e-9
+"""Added to a Hessian's diagonal, as no reading may tell of a parameter, or two may act alike [1]."""
+
 ROUNDING = 1e-10
 """Relative excess of a bound, and slope at a bound, that is rounding [1]."""
 
@@ -23,7 +26,7 @@ def bounded_minimiser(matrix: NDArray, moment: NDArray, low: NDArray, high: NDAr
     if not len(moment):
         return np.zeros(0)
     scale = 1.0 / np.sqrt(np.diag(matrix))
-    scaled = matrix * np.outer(scale, scale) + 1e-12 * np.eye(len(scale))  # columns may be equal
+    scaled = matrix * np.outer(scale, scale) + RIDGE * np.eye(len(scale))
     return np.clip(_pivoted(scaled, moment * scale, low / scale, high / scale) * scale, low, high)
 
 
@@ -126,7 +129,7 @@ class RunProducts:
         value = np.linalg.solve(own, moment[..., None])[..., 0]
         for r in np.flatnonzero(np.any(np.abs(value) > self.bounds, axis=1)):
             value[r] = bounded_minimiser(own[r], moment[r], -self.bounds[r], self.bounds[r])
-        ended = np.abs(value) >= (1.0 - 1e-9) * self.bounds  # but for rounding
+        ended = np.abs(value) >= (1.0 - ROUNDING) * self.bounds
         return np.where(ended, np.sign(value) * self.bounds, np.nan)
 
     def reduced(self, held: NDArray) -> NDArray:
@@ -245,7 +248,7 @@ def _bounded_solution(
         matrix = gram[1:, 1:].copy()
         damped = np.arange(k)
         matrix[damped, damped] *= 1.0 + damping
-        matrix[damped, damped] += 1e-9
+        matrix[damped, damped] += RIDGE
         own = np.ix_(free, free)
         best[free] = bounded_minimiser(matrix[own], gram[1:, 0][free], ends[0][free], ends[1][free])
         beyond = runs.held(best)

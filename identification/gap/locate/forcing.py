@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem
 from identification.gap.fit.gauss_newton import linearise
-from identification.gap.fit.variable_projection import LinearisedRun
+from identification.gap.fit.variable_projection import RIDGE, LinearisedRun
 from identification.gap.plant import (
     GreyBox,
     StateEquation,
@@ -113,7 +113,7 @@ class NuisanceElimination:
             chi_square += float(residual @ residual + precision @ run.run_values**2)
         tolerances = np.arange(k, shared)
         self._hessian[tolerances, tolerances] += 1.0
-        self._hessian[np.diag_indices_from(self._hessian)] += 1e-9  # no reading may tell of some
+        self._hessian[np.diag_indices_from(self._hessian)] += RIDGE
         explained = self._gradient @ np.linalg.solve(self._hessian, self._gradient)
         self.chi_square = float(chi_square - explained)
         """Sum of squares of the residual after the elimination [1]."""

@@ -35,7 +35,7 @@ MOST_CAUSES = 4
 
 WIDTH = 4
 """Width of the beam: sets of one size, and hypotheses of that size, that are fitted further; laws that
-are tried for each. Twice as many first causes, and pairs, are begun. For computing time."""
+are tried of the best one. Twice as many first causes, and pairs, are begun. For computing time."""
 
 FIRST_ITERATIONS = 5
 """Most steps of the first fits, for computing time: those of finalists go on."""
@@ -131,15 +131,15 @@ class HypothesisPool:
             self.add(self._with_another_law(best))
 
     def _with_another_law(self, chosen: Sequence[EvaluatedHypothesis]) -> list[Estimate]:
-        """Fits of each of the best with one law more; of each, the laws that promise most."""
+        """Fits with one law more: the most probable one is tried with the most laws."""
 
         def fits() -> list[Estimate]:
             starts = []
-            for each in chosen:
+            for rank, each in enumerate(chosen, start=1):
                 base, causes = each.estimate, each.estimate.hypothesis.causes
                 runs = _most_misfitting(self.problem, dict(enumerate(each.residuals)))
                 found = law_starts(self.problem, base, [base] * len(causes), causes, runs)
-                starts += [start.estimate for start in found[:WIDTH]]
+                starts += [start.estimate for start in found[: max(WIDTH // rank, 1)]]
             distinct = {_key(start.hypothesis): start for start in reversed(starts)}
             return fit(self.problem, list(distinct.values()), iterations=FIRST_ITERATIONS)
 
@@ -184,7 +184,10 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
         signatures: of all causes beside it.
     """
     _fit_beside(pool, base, signatures)
-    _from_elsewhere(pool)
+    if pool.much_is_left():
+        # Without the right cause a fit may end in a corner, far from the truth.
+        _fit_beside(pool, pool.problem.nominal_start(), name="at nominal parameters")
+        _with_parameters_of_the_best(pool)
     pool.finish(1)
     for number in range(2, MOST_CAUSES + 1):
         if not pool.much_is_left() or (number > 2 and not _last_cause_helped(pool, number - 1)):
@@ -198,17 +201,26 @@ def search_causes(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cau
 
 
 def _last_cause_helped(pool: HypothesisPool, number: int) -> bool:
-    """Whether the best fit with a number of causes leaves less by a fifth than that with one less."""
+    """Whether the best fit with a number of causes leaves less by a fifth than that with one less.
+
+    A second of four causes may hardly pay.
+    """
     found = pool.posterior()
     pairs = zip(found.misfits, found.hypotheses, strict=True)
     left = {len(each.labels): m for m, each in sorted(pairs, key=lambda pair: -pair[0])}
     return left.get(number, np.inf) <= 0.8 * left[number - 1]
 
 
-def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[CauseSignature] = ()) -> None:
+def _fit_beside(
+    pool: HypothesisPool,
+    base: Estimate,
+    signatures: Sequence[CauseSignature] = (),
+    name: str = "",
+) -> None:
     """Fit a set with each of the most promising further causes, as assumed and with an open law.
 
-    base: the set's estimate. signatures: of all causes beside it, where they are known.
+    base: the set's estimate. signatures: of all causes beside it, where they are known. name: in the
+    journal.
     """
     problem, hypothesis = pool.problem, base.hypothesis
     known = {cause.name for cause in hypothesis.causes}
@@ -216,7 +228,7 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
         cause
         for cause in problem.plant.causes
         if cause.name not in known
-        and replace(hypothesis, causes=(*hypothesis.causes, cause)) not in pool
+        and (not known or replace(hypothesis, causes=(*hypothesis.causes, cause)) not in pool)
     ]
     if not others:
         return
@@ -232,7 +244,8 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
         lawful = [] if hypothesis.causes else assumed
         estimates = [start.estimate for start in lawful]
         opened = law_starts(problem, base, estimates, [start.cause for start in lawful], runs)
-        promise = {start.labels: start.chi_square / base.chi_square for start in reversed(assumed)}
+        left = normal_equations(base_runs).chi_square
+        promise = {start.labels: start.chi_square / left for start in reversed(assumed)}
         whole = normal_equations(
             [run for run, r in zip(base_runs, problem.fitted_runs, strict=True) if r in runs]
         ).chi_square
@@ -241,9 +254,10 @@ def _fit_beside(pool: HypothesisPool, base: Estimate, signatures: Sequence[Cause
             promise[start.labels] = min(promise.get(start.labels, np.inf), share)
         best = set(sorted(promise, key=lambda labels: promise[labels])[: 2 * WIDTH])
         starts = [s for s in (*assumed, *best_start_of_each(opened)) if s.labels in best]
-        return fit(problem, [s.estimate for s in starts], base.chi_square, iterations=FIRST_ITERATIONS)
+        rival = min(left, pool.recalibrated.estimate.chi_square)
+        return fit(problem, [s.estimate for s in starts], rival, iterations=FIRST_ITERATIONS)
 
-    name = f"beside {_name(hypothesis) or 'nothing'}"
+    name = name or f"beside {_name(hypothesis) or 'nothing'}"
     pool.add(pool.cache(name, fits, lambda estimate: problem.slopes_of(base)))
 
 
@@ -259,29 +273,21 @@ def _most_misfitting(problem: FittingProblem, residuals: Mapping[int, NDArray]) 
     return [r for r, b in zip(order, before, strict=True) if b < 0.5 * sum(lengths.values())]
 
 
-def _from_elsewhere(pool: HypothesisPool) -> None:
-    """Fit no cause and the best single ones again: from the nominal model, from each other's parameters.
-
-    Without the right cause a fit may end in a corner, far from the truth.
-    """
+def _with_parameters_of_the_best(pool: HypothesisPool) -> None:
+    """Fit no cause and the single ones next to the best one again, from its calibrated parameters."""
     problem, found = pool.problem, _best_of_sets(pool.ranked(1))[:WIDTH]
     if not found:
         return
-    nominal = {p.symbol: p.nominal for p in problem.plant.parameters}
-    places = [nominal] + [problem.values(each.estimate) for each in found[:1]]
-    starts = []
-    for values in places:
-        four = {symbol: values[symbol] for symbol in nominal}
-        starts.append(problem.start(Hypothesis(causes=()), four))
-        for each in found:
-            own = problem.values(each.estimate)
-            if any(own[symbol] != four[symbol] for symbol in four):
-                begun = problem.start(each.estimate.hypothesis, own | four)
-                starts.append(replace(begun, slopes=each.estimate.slopes))
+    values = problem.values(found[0].estimate)
+    best = {p.symbol: values[p.symbol] for p in problem.plant.parameters}
+    starts = [problem.start(Hypothesis(causes=()), best)]
+    for each in found[1:]:
+        begun = problem.start(each.estimate.hypothesis, problem.values(each.estimate) | best)
+        starts.append(replace(begun, slopes=each.estimate.slopes))
     slopes = {e.labels: problem.slopes_of(e.estimate) for e in found}
     pool.add(
         pool.cache(
-            f"from elsewhere: {_names(found)}",
+            f"with parameters of the best: {_names(found)}",
             lambda: fit(problem, starts, iterations=FIRST_ITERATIONS),
             lambda estimate: slopes.get(estimate.hypothesis.labels, problem.slopes),
         )

@@ -10,9 +10,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from identification.gap.fit.fitting_problem import Estimate, FittingProblem
+from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import linearise
-from identification.gap.fit.laws import COMPONENTS, LARGEST, MOST_LAWS, Law
+from identification.gap.fit.laws import COMPONENTS, LARGEST, MOST_LAWS, MOST_OF_CAUSE, Law
 from identification.gap.fit.recalibration import restarted
 from identification.gap.fit.variable_projection import LinearisedRun, equations_of, products_of
 from identification.gap.plant import Cause
@@ -45,7 +45,7 @@ def law_starts(
     pairs = [
         (at_least_trial_size(problem, estimate, cause), cause)
         for estimate, cause in zip(estimates, causes, strict=True)
-        if not cause.exact_form and len(estimate.hypothesis.laws) < MOST_LAWS
+        if not cause.exact_form and _may_have_another(estimate.hypothesis, cause)
     ]
     starts: list[Start] = []
     for first in range(0, len(pairs), TOGETHER):
@@ -55,6 +55,12 @@ def law_starts(
         for (estimate, _), whole, own in zip(part, opened, linearised, strict=True):
             starts += _starts(problem, estimate, whole, own)
     return sorted(starts, key=lambda start: start.chi_square)
+
+
+def _may_have_another(hypothesis: Hypothesis, cause: Cause) -> bool:
+    """Whether one more law of a cause may be opened."""
+    own = sum(law.cause.label == cause.label for law in hypothesis.laws)
+    return len(hypothesis.laws) < MOST_LAWS and own < MOST_OF_CAUSE
 
 
 def _starts(

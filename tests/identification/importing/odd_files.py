@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from identification.importing.import_campaign import LARGEST_FILE
-from identification.importing.source_file import MOST_CHANNELS
+from epv_env.common.files import LARGEST_FILE
 from identification.recordings.recording import Recording
 from tests.identification.importing.dialects import columns_of, mat5, named, text
 from tests.identification.importing.timed_files import channels_of, frame
@@ -137,12 +136,6 @@ def restarted(at: Path, true: Recording) -> Path:
     return timed(at, true, {"time [s]": np.where(true.time < 0.3, true.time, true.time - 0.3)})
 
 
-def wrapped(at: Path, true: Recording) -> Path:
-    """A counter of ms that begins again after 65,535, and a stamp that was lost."""
-    count = (65_300 + 1e3 * true.time) % 65_536
-    return timed(at, true, {"t [ms]": np.where(np.arange(len(true)) == 100, 0.0, count)})
-
-
 def nanoseconds(at: Path, true: Recording) -> Path:
     """MDF with unsigned integers of nanoseconds and a linear conversion to seconds as times."""
     from asammdf import MDF, Signal
@@ -203,7 +196,6 @@ READ: dict[str, Callable[[Path, Recording], Path]] = {
             "DT0;DT2;DT4;DT6;DT8;DT10",
         ],
     ),
-    "a counter that wraps": wrapped,
     "nanoseconds with a conversion": nanoseconds,
 }
 
@@ -240,8 +232,8 @@ def nulls(at: Path, true: Recording) -> Path:
 
 
 def texts(at: Path, true: Recording) -> Path:
-    """Parquet whose p2 is a column of texts."""
-    frame(true, true.time).astype({"p2 [bar]": str}).to_parquet(at.with_suffix(".parquet"))
+    """Parquet whose p2 is a column of words."""
+    frame(true, true.time).assign(**{"p2 [bar]": "high"}).to_parquet(at.with_suffix(".parquet"))
     return at.with_suffix(".parquet")
 
 
@@ -265,10 +257,6 @@ def table(at: Path, names: list[str]) -> Path:
     return at.with_suffix(".csv")
 
 
-def numbered(count: int) -> list[str]:
-    return [str(i) for i in range(count)]
-
-
 TEXTS, ENDLESS = np.array(["text"], dtype=object), "a" + 10_000 * " " + "b"
 
 
@@ -285,22 +273,20 @@ def coarse(at: Path, true: Recording) -> Path:
     return text(at, {**columns_of(true), "time": (np.round(true.time, 3), "s")})
 
 
-CUT = r"line \d+ has not the 6 numbers of the lines above: delete it"
 REFUSED: dict[str, tuple[Callable[[Path, Recording], Path], str]] = {
-    "a cut last line": (lambda at, r: rows(at, r, [BRACKETED], last="0.65;0.44;18.9"), CUT),
-    "text below the numbers": (lambda at, r: rows(at, r, [BRACKETED], last="\nstopped by hand\n"), CUT),
-    "a record that begins again": (restarted, "time does not increase after .*: cut the recording"),
-    "times of too few digits": (coarse, "time does not increase after .*: print it with more digits"),
+    "a record that begins again": (restarted, r"not increase after .* s \(line \d+\): cut the record"),
+    "times of too few digits": (coarse, r"time does not increase after .*: print it with more digits"),
     "a time of day in seconds": (
         lambda at, r: timed(at, r, clock(r, "%H:%M:%S")),
         "does not increase .* with more digits",
     ),
     "a text called MDF": (lambda at, r: written(at.with_suffix(".mf4"), "a"), "not begin as MDF does"),
-    "a folder": (lambda at, r: folder(at), "is a folder: give the path of a measurement file"),
-    "a file above the limit": (lambda at, r: huge(at), "is larger than .* bytes"),
-    "very many columns": (lambda at, r: table(at, numbered(MOST_CHANNELS + 1)), "more than .* channels"),
-    "lines without end": (lambda at, r: table(at, numbered(100_000)), "has lines of more"),
-    "a name without end": (lambda at, r: table(at, ["time", ENDLESS]), "more than .* characters"),
+    "a folder": (
+        lambda at, r: folder(at.with_suffix(".csv")), r"\(no regular file\): give a measurement file"
+    ),
+    "a file above the limit": (lambda at, r: huge(at), "larger than .* bytes"),
+    "a line without end": (lambda at, r: written(at.with_suffix(".csv"), "1" * 10**6), "no separator"),
+    "a name without end": (lambda at, r: table(at, ["time", ENDLESS]), "not used are a +: say it"),
     "LabVIEW's channels that begin apart": (begun_apart, "begin at different times of day"),
-    "a MATLAB file of texts": (lambda at, r: mat5(at, {"a": TEXTS}), "no series of numbers in it"),
-}
+    "a MATLAB file of texts": (lambda at, r: mat5(at, {"a": TEXTS}), "holds no numbers: export it"),
+}  # fmt: skip

@@ -3,6 +3,7 @@
 import json
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from identification.importing.import_campaign import import_text, read_files
@@ -10,7 +11,7 @@ from identification.importing.mapping_file import ChannelEntry, MappingFile
 from identification.importing.source_file import ImportingError
 from identification.importing.times import points_in_time, seconds
 from identification.recordings.campaign_files import read_campaign
-from identification.recordings.recording import CHANNELS
+from identification.recordings.recording import CHANNELS, CampaignError
 from tests.identification.importing.dialects import bench, columns_of, import_campaign, mat5, text
 from tests.identification.importing.dialects import tdms as in_groups
 from tests.identification.importing.timed_files import LEAD, TWO_RATES, channels_of, structs, tdms
@@ -22,12 +23,19 @@ def true():
     return bench().recordings[1]
 
 
+def treated(imported):
+    """How the channels of the first file came to other times than its own."""
+    channels = imported.files[0].channels
+    return {c.name: c.treated for c in channels if c.treated != "as recorded"}
+
+
 @pytest.mark.parametrize("kind", TWO_RATES)
 def test_channels_of_two_rates_come_to_the_slower_one(kind, tmp_path):
     files = [TWO_RATES[kind](tmp_path / r.name, r) for r in bench().recordings]
     imported = import_campaign(files, tmp_path / "campaign", ambient_bar=1.0)
-    assert imported.files[0].gridded.resampled == ("I",)
-    assert imported.files[0].gridded.held == ("U",)
+    assert {name: how.split()[-2] for name, how in treated(imported).items()} == {
+        "I": "low-pass", "U": "entry",
+    }  # fmt: skip
     campaign = read_campaign(tmp_path / "campaign")
     for made, true in zip(campaign.recordings, bench().recordings, strict=True):
         assert made.period == 2 * true.period
@@ -46,7 +54,7 @@ def jittering(path, true, size):
 @pytest.mark.parametrize("size", [5e-7, 4e-6])
 def test_times_within_rounding_of_the_grid_leave_every_value_as_it_is(true, size, tmp_path):
     made, plain = (jittering(tmp_path / "a.csv", true, each) for each in (size, 0.0))
-    assert made.files[0].gridded.resampled == made.files[0].gridded.held == ()
+    assert treated(made) == {}
     assert made.campaign.recordings[0].period == true.period
     for name in CHANNELS:
         same = plain.campaign.recordings[0].channel(name)
@@ -58,8 +66,8 @@ def test_a_voltage_at_jittering_times_is_held_and_the_rest_said_to_be_filtered(t
     U = made.campaign.recordings[0].U
     assert np.all(np.isin(U, made.files[0].channels[1].values))  # no value between or beyond
     shown = import_text(made)
-    assert "I, p1, p2, p3: other times than the file's, low-pass filtered" in shown
-    assert "U: other times than the file's, each sample is the last entry before it" in shown
+    assert shown.count("at other times, low-pass filtered") == 4
+    assert shown.count("at other times, held from the entry before") == 1
 
 
 def test_a_command_logged_on_change_holds_from_one_entry_to_the_next(true, tmp_path):
@@ -116,19 +124,23 @@ def test_a_mapping_file_gives_the_unit_of_times_in_structs(true, tmp_path):
     assert made.period == true.period
 
 
+def points(*texts):
+    """Seconds since the first of some points in time, and that one."""
+    return seconds(points_in_time(pd.Series(texts, dtype=object)))
+
+
 def test_points_in_time_are_read_to_the_nanosecond_and_zones_are_taken_off():
     same = [
         "2026-03-01T12:00:00.000000001Z",
         "20260301T140000,000000001+0200",
         "2026-03-01 08:30:00.000000001-03:30",
     ]
-    assert set(points_in_time("a", same)) == {np.datetime64("2026-03-01T12:00:00.000000001", "ns")}
-    values, begin = seconds(points_in_time("a", ["2026-03-01T12:00", "", "2026-03-01T12:00:00.5"]))
+    values, begin = points(*same)
+    assert begin == np.datetime64("2026-03-01T12:00:00.000000001", "ns")
+    np.testing.assert_array_equal(values, 0.0)
+    values, begin = points("2026-03-01T12:00", None, "2026-03-01T12:00:00.5")
     np.testing.assert_array_equal(values, [0.0, np.nan, 0.5])
     assert begin == np.datetime64("2026-03-01T12:00")
-    for wrong in ("2026-02-30T12:00", "yesterday"):
-        with pytest.raises(ImportingError, match=rf"no point in time .*{wrong}"):
-            points_in_time("a", ["2026-03-01T12:00", wrong])
 
 
 def test_channels_with_and_without_a_known_begin_are_not_put_side_by_side(true, tmp_path):
@@ -139,3 +151,15 @@ def test_channels_with_and_without_a_known_begin_are_not_put_side_by_side(true, 
     mapping = MappingFile(channels=channels | {"I": ChannelEntry(source="second/I")})
     with pytest.raises(ImportingError, match="export all with the same kind of time"):
         read_files([path], mapping=mapping)
+
+
+@pytest.mark.parametrize(("name", "end"), [("p2", 8.0), ("I", 0.4), ("p3", 12.0)])
+def test_a_clipped_channel_is_named_before_the_filter_hides_it(true, name, end, tmp_path):
+    columns = columns_of(true)
+    columns[name] = (np.minimum(columns[name][0], end), columns[name][1])
+    off = np.random.default_rng(2).uniform(-1e-4, 1e-4, len(true))
+    path = text(tmp_path / "a.csv", columns | {"time": (true.time + off, "s")})
+    with pytest.raises(
+        CampaignError, match=rf"a.csv, {name} .*, lines \d+ to \d+: {name} stays at {end:g}"
+    ):
+        read_files([path], ambient_bar=1.0)

@@ -28,14 +28,13 @@ def stamps(recording: Recording) -> NDArray:
     return NOON + np.round(recording.time * 1e9).astype("timedelta64[ns]")
 
 
-def structs(recording: Recording, every: int = 1, ms: bool = False) -> dict[str, Any]:
+def structs(recording: Recording, every: int = 1) -> dict[str, Any]:
     """MATLAB structs with a time vector of their own; of the pressures every n-th sample."""
     return {
         name: {
             "data": values[:: every if name.startswith("p") else 1],
-            "time": recording.time[:: every if name.startswith("p") else 1] * (1e3 if ms else 1.0),
+            "time": recording.time[:: every if name.startswith("p") else 1],
             "unit": unit,
-            **({"time_unit": "ms"} if ms else {}),
         }
         for name, (values, unit) in channels_of(recording).items()
     }
@@ -103,8 +102,8 @@ def tdms(path: Path, recording: Recording, *, waveform: bool, every: int = 1, le
 SAME_RATE: dict[str, Callable[[Path, Recording], Path]] = {
     "MATLAB 5, a time per channel": lambda at, r: mat5(at, structs(r)),
     "MATLAB 7.3, a time per channel": lambda at, r: mat73(at, structs(r)),
-    "MATLAB 5, times in ms": lambda at, r: mat5(at, {"log": structs(r, ms=True)}),
-    "MATLAB 7.3, times in ms": lambda at, r: mat73(at, {"log": structs(r, ms=True)}),
+    "MATLAB 5, in a struct": lambda at, r: mat5(at, {"log": structs(r)}),
+    "MATLAB 7.3, in a struct": lambda at, r: mat73(at, {"log": structs(r)}),
     "MATLAB 5, time beside the struct": lambda at, r: mat5(at, time_beside(r)),
     "MATLAB 7.3, time beside the struct": lambda at, r: mat73(at, time_beside(r)),
     "text, ISO 8601": lambda at, r: csv(at, frame(r, stamps(r))),
@@ -114,7 +113,6 @@ SAME_RATE: dict[str, Callable[[Path, Recording], Path]] = {
     ),
     "Parquet, points in time": lambda at, r: parquet(at, frame(r, stamps(r))),
     "Parquet, texts": lambda at, r: parquet(at, frame(r, zoned(r, ""))),
-    "Parquet, durations": lambda at, r: parquet(at, frame(r, pd.to_timedelta(r.time, unit="s"))),
     "TDMS, points in time": lambda at, r: tdms(at, r, waveform=False),
     "TDMS, waveforms": lambda at, r: tdms(at, r, waveform=True),
 }

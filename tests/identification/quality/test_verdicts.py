@@ -19,8 +19,8 @@ from identification.quality.section import (
     quality_section,
     worst_status,
 )
+from identification.recordings.plausibility import longest_run
 from identification.recordings.recording import CHANNELS, UNITS, CampaignError
-from identification.recordings.recording_checks import longest_run
 from identification.report.page import Picture, Table
 from tests.identification.quality.printed import STATISTICS, TREND_OFFSETS, TREND_SLOPES
 from tests.identification.quality.records import AMBIENT, PERIOD, readings, rest_record, with_channel

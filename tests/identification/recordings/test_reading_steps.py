@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.readings_noise import quantisation_step
+from identification.noise import quantisation_step
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.noise import campaign_steps, coarse_step_warnings
 from identification.recordings.recording import PRESSURES, CampaignError
@@ -72,7 +72,10 @@ def test_a_campaign_in_coarse_steps_is_accepted(tmp_path, change, which):
     [
         (held("p2", 7e5), "p2_bar is 7 throughout.*: check its sensor"),
         (held("I", 0.5), "I_A is 0.5 throughout.*: check its sensor"),
-        (held("p1", 15e5), "p1 is 15 and p3 12 bar, although .*: check unit, sign and sensor of p1_bar"),
+        (
+            held("p1", 15e5),
+            "p1 is 15 and p3 12 bar, although .*: check unit, reference, sign and sensor of p1_bar",
+        ),
     ],
 )
 def test_what_cannot_be_is_refused_in_coarse_steps_too(tmp_path, change, message):

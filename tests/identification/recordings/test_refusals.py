@@ -122,6 +122,11 @@ def linked(folder: Path) -> None:
     (folder / "test1.csv").symlink_to(target)
 
 
+def late(pressure: NDArray) -> NDArray:
+    """It settles only after the beginning."""
+    return pressure - 0.8 * (np.arange(len(pressure)) < 50)
+
+
 def jittered(time: NDArray) -> NDArray:
     return time + np.where(np.arange(len(time)) % 7 == 3, 1e-4, 0.0)
 
@@ -149,27 +154,27 @@ CSV_FILES = [  # damage, place, rule, remedy
     (column("time_s", lambda t: t + 0.0002 * (t > 0.3)), "line 603", "uniform sampling has", "resample"),
     (column("time_s", jittered), "line ", "rounding to the printed digits does not", "resample"),
     (rows(lambda c: c.__delitem__(slice(1, None))), "line 2", "ends after 0 samples", "for longer"),
-    (rows(lambda c: c.__delitem__(slice(81, None))), "line 82", "needs at least 81", "for longer"),
+    (rows(lambda c: c.__delitem__(slice(81, None))), "line 81", "needs at least 81", "for longer"),
     (held("I_A", slice(None), 0.5), "lines 2 to 1302", "I_A is 0.5 throughout", "check its sensor"),
     (held("p3_bar", slice(None), 16), "lines 2 to 1302", "p3_bar is 16 throughout", "check its sensor"),
-    (column("p2_bar", lambda p: 1e2 * p), "lines 2 to 1302", "looks like kPa", "divide by 100"),
-    (column("p3_bar", lambda p: p - p.min()), "lines 2 to", "p3 falls to", "check unit, sign and"),
+    (column("p2_bar", lambda p: 1e2 * p), "p2 rises to 8", "beyond the sensor", "check unit"),
+    (column("p3_bar", lambda p: p - p.min()), "p3 falls to", "below the ambient", "sensor of p3_bar"),
     (cell("p2_bar", 40, "16.3"), "line 40", r"p2_bar is 16.3, outside .*\[1, 16\]", "check unit and"),
     (cell("I_A", 40, "1.02"), "line 40", r"I_A is 1.02, outside .*\[-1, 1\]", "check unit and scaling"),
-    (held("p2_bar", slice(300, 400), 16.256), "lines 302 to 401", "p2_bar is stuck at 16.256", "record"),
-    (held("p3_bar", slice(300, 341), 1.0), "lines 302 to 342", "p3_bar is stuck at 1,", "the sensor"),
+    (held("p2_bar", slice(300, 400), 16.256), "lines 302 to 401", "p2_bar stays at 16.256", "record"),
+    (held("p3_bar", slice(300, 341), 1.0), "lines 302 to 342", "p3_bar stays at 1, its least", "record"),
     (held("U_V", slice(None), 0), "lines 2 to 1302", "U_V never switches", "the role quality"),
     (column("U_V", lambda U: 24 + U / 2400), "lines 2 to 1302", "U_V never switches", "record a switch"),
     (held("U_V", slice(70, 90), 0), "line 72", "U_V is 0 V at 35 ms, .* at least 40 ms", "record from"),
-    (column("U_V", lambda U: 24 - U), "lines 2 to", "A flows while the coil is off", "check unit, sign"),
-    (held("p2_bar", slice(50), 6), "lines 2 to 81", "p2_bar changes by 0.[0-9]*", "bench settle"),
+    (column("U_V", lambda U: 24 - U), "a current of", "A flows while the coil is off", "check unit"),
+    (column("p2_bar", late), "lines 2 to 81", "p2_bar changes by 0.[0-9]*", "bench settle"),
 ]  # fmt: skip
 
 OTHER_ROLES = [
     ("validation.csv", held("U_V", slice(None), 24, "validation.csv"), "lines 2 to 1302", "U_V never"),
     ("validation.csv", held("U_V", slice(5, 9), 0, "validation.csv"), "line 7", "start energised"),
     ("rest.csv", held("p1_bar", slice(None), 1, "rest.csv"), "lines 2 to 1001", "p1_bar is 1 through"),
-    ("rest.csv", rows(lambda c: c.__delitem__(slice(1000, None)), "rest.csv"), "line 1001", "at least"),
+    ("rest.csv", rows(lambda c: c.__delitem__(slice(1000, None)), "rest.csv"), "line 1000", "at least"),
 ]  # fmt: skip
 
 MANIFESTS = [  # damage, message
@@ -214,7 +219,7 @@ def test_the_campaign_that_is_damaged_here_is_good(folder):
 )
 def test_a_bad_recording_is_refused(folder, damage, place, rule, remedy):
     damage(folder)
-    sentence = f"^{re.escape(str(folder / 'test1.csv'))}, {place}.*{rule}.*: .*{remedy}"
+    sentence = f"^{re.escape(str(folder / 'test1.csv'))}[,:] {place}.*{rule}.*: .*{remedy}"
     assert re.search(sentence, refusal(folder)), refusal(folder)
 
 

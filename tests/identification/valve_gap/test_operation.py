@@ -8,6 +8,7 @@ from typing import Any
 
 import gymnasium
 import numpy as np
+import pandas as pd
 import pytest
 
 import epv_env  # noqa: F401 - registers the environments
@@ -250,9 +251,9 @@ def often_opened(tmp_path_factory):
 @pytest.mark.parametrize(
     ("change", "told"),
     [
-        (scaled("p2_bar", 100.0), "p2_bar looks like kPa: give bar absolute"),
-        (scaled("p3_bar", 1.0, -1.0), "p3_bar looks like gauge pressure"),
-        (scaled("I_A", -1.0), "I_A looks like a current with its sign flipped"),
+        (scaled("p2_bar", 100.0), "beyond the sensor's 16 bar: check unit, .* of p2_bar"),
+        (scaled("p3_bar", 1.0, -1.0), "joins them: check unit, reference, .* of p1_bar, p3_bar"),
+        (scaled("I_A", -1.0), "A make -[0-9.]+ ohm, and coils have 8 to 220 ohm"),
         (scaled("I_A", 0.0, -1.0), "line 2?[0-9]+: .*and coils have 8 to 220 ohm"),
         (one_wild, r"drive-1.csv, line 2: U_supply_V is 1e\+300, outside the sensor's range"),
     ],
@@ -267,12 +268,12 @@ def test_readings_that_no_valve_shows_are_refused(change, told, often_opened, tm
 @pytest.mark.parametrize(
     ("failed", "told"),
     [
-        (scaled("I_A", 1.0, 0.1), "A flows while the coil is off"),
-        (scaled("I_A", 0.0), "make inf ohm, .*: check unit, sign and sensor"),
+        (scaled("I_A", 0.0, 0.5), "A flows while the coil is off"),
+        (scaled("I_A", 0.0), "make inf ohm, .*: check unit, reference, sign and"),
     ],
 )
 def test_a_sensor_that_fails_on_the_way_is_left_to_the_diagnosis(failed, told, often_opened, tmp_path):
-    """A current without a voltage, or none: from the second drive on a fault, in all drives refused."""
+    """A current that stays, or none: from the second drive on a fault, in all drives refused."""
     text = (often_opened / "drive-1.csv").read_text()
     content = json.loads((often_opened / "log.json").read_text())
     content["drives"] = [{"file": name} for name in ("drive-1.csv", "drive-2.csv")]
@@ -283,6 +284,18 @@ def test_a_sensor_that_fails_on_the_way_is_left_to_the_diagnosis(failed, told, o
     (tmp_path / "drive-1.csv").write_text(failed(text))
     with pytest.raises(CampaignError, match=rf"drive-1.csv, line .*{told}"):
         read_log(tmp_path)
+
+
+@pytest.mark.parametrize("rest", [0.03, 0.12, 0.25])
+def test_a_current_that_never_ends_is_left_to_the_diagnosis(rest, often_opened, tmp_path):
+    """In all drives, from the first one on: an eddy current, a driver or a sensor."""
+    for file in often_opened.iterdir():
+        (tmp_path / file.name).write_text(file.read_text())
+    frame = pd.read_csv(tmp_path / "drive-1.csv")
+    frame["I_A"] = np.maximum(frame["I_A"], rest)
+    frame.to_csv(tmp_path / "drive-1.csv", index=False)
+    log = read_log(tmp_path)
+    assert openings(log, PLANT.parameters)[0].recordings
 
 
 @pytest.mark.parametrize(

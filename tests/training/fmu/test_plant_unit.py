@@ -96,10 +96,12 @@ def test_ten_thousand_random_steps_are_the_kernels(unit):
 
 
 def test_laws_act_as_in_the_kernel(unit):
-    """Two laws, of friction and of the eddy current that the terminals show."""
+    """Four laws, of friction and of the eddy current that the terminals show."""
     growth = (0.0, 0.1, 0.3, 0.5, 0.8, 1.0, 1.0, 0.5, 0.2)
     laws = placed(1, PLACES["piston_friction"], "p3", 1e5, 9e5, growth)
     laws |= placed(2, PLACES["eddy_current"], "I", 0.0, 0.3, growth)
+    laws |= placed(3, PLACES["piston_friction"], "|vPV|", 0.0, 0.5, growth[::-1])
+    laws |= placed(4, PLACES["eddy_current"], "p1 - p3", 0.0, 6e5, growth[::-1])
     p = Parameters.calibrated().replace(F_PV=5.0, G_eddy=4e-3)
     law, plain = (started(unit, each, longest_step=FINE) for each in (p.replace(**laws), p))
     valves = kernel_of([p.replace(**laws)])

@@ -46,29 +46,7 @@ class PlantC(Translation):
 
     def translated(self, python: Callable[..., Any], types: tuple[str, ...]) -> tuple[str, CFunction]:
         """The text of a function, and how to call it."""
-        if python.__code__.co_filename == "<string>":
-            return self._traced(python, types)
         return _PlantBody(self, python, types).translated()
-
-    def _traced(self, python: Callable[..., Any], types: tuple[str, ...]) -> tuple[str, CFunction]:
-        """C of a function that `primitives.generated` made from text: one expression, traced."""
-        kinds = {name: kind for kind, name in self.structures.items()}
-        names = list(inspect.signature(python).parameters)
-        arguments = [
-            kinds[kind](*(Symbol(f"{name}->{each}") for each in kinds[kind]._fields))  # type: ignore[attr-defined]
-            if kind in kinds
-            else Symbol(name)
-            for name, kind in zip(names, types, strict=True)
-        ]
-        result = python(*arguments)
-        kind = self.structure(type(result))
-        members = ",\n        ".join(f".{each} = {written(v)}" for each, v in result._asdict().items())
-        taken = {known.name for _, known in self.functions.values()}
-        name = python.__name__ if python.__name__ not in taken else f"{python.__name__}_{len(taken)}"
-        passed = ", ".join(map(_declared, names, types))
-        body = f"    return ({kind}){{\n        {members}}};\n"
-        done = CFunction(name=name, result=kind)
-        return f"static inline {kind} {name}({passed})\n{{\n{body}}}\n", done
 
 
 def _declared(name: str, kind: str) -> str:

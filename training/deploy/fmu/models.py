@@ -21,6 +21,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.plant.runge_kutta import held_still, is_held
 from epv_env.plant.stepping import (
     LANDING,
+    MOST_RESTITUTION,
     RELEASE_LOCATIONS,
     RELEASE_MARGIN,
     SHORTEST_STEP,
@@ -150,7 +151,7 @@ def _sources() -> dict[str, str]:
         derivative, (state, inputs, coefficients, effects, NUMBER, NUMBER, TRUTH)
     )
     for function, types in (
-        (with_laws, (state, effects)),
+        (with_laws, (state, effects, TRUTH)),
         (coil_current, (*[NUMBER] * 4, effects)),
         (longest_step, (NUMBER, state, effects, NUMBER, NUMBER)),
         (is_held, (NUMBER,) * 4),
@@ -168,6 +169,7 @@ def _sources() -> dict[str, str]:
         "most_steps": MOST_STEPS_PER_SECOND,
         "landing": repr(LANDING),
         "stick_speed": repr(STICK_SPEED),
+        "most_restitution": repr(MOST_RESTITUTION),
         "release_margin": repr(RELEASE_MARGIN),
         "release_locations": str(RELEASE_LOCATIONS),
         "shortest_step": repr(SHORTEST_STEP),

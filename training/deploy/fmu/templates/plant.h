@@ -13,6 +13,7 @@
 
 #define LANDING $landing           /* nearer to a stop than this a mover has landed [m] */
 #define STICK_SPEED $stick_speed   /* a slower rebound ends at the stop [m/s] */
+#define MOST_RESTITUTION $most_restitution /* of the armature under a law [-] */
 #define RELEASE_LOCATIONS $release_locations /* how often a release is located */
 #define RELEASE_MARGIN $release_margin /* time by which a release is overstepped [s] */
 #define SHORTEST_STEP $shortest_step   /* every step makes at least this much progress [s] */
@@ -138,6 +139,7 @@ static double step(State *q, const conditions *on, double remaining, double *hin
     const double free_PV = held_PV ? 0.0 : 1.0, free_MV = held_MV ? 0.0 : 1.0;
     const State k1 = held_still(&first.part0, free_PV, free_MV);
     double h = lesser((held_PV && held_MV ? 2.0 : 1.0) * on->longest_step, lesser(*hint, remaining));
+    double restitution_MV;
     trial t;
     State *end = &t.end;
     int event;
@@ -158,12 +160,14 @@ static double step(State *q, const conditions *on, double remaining, double *hin
         return 0.0;
     }
     land(&end->xPV, &end->vPV, c->xPVmax, c->ePV);
-    land(&end->xMV, &end->vMV, c->xMVmax, c->eMV);
     end->I_coil = end->I;
+    restitution_MV = 0.0;
     if (on->extended) {
-        const Effects acting = with_laws(end, &on->effects);
+        const Effects acting = with_laws(end, &on->effects, on->extended);
+        restitution_MV = lesser(acting.restitution_MV, MOST_RESTITUTION);
         end->I_coil = coil_current(on->u.U, end->I, c->R, end->coil_heat, &acting);
     }
+    land(&end->xMV, &end->vMV, c->xMVmax, restitution_MV);
     *q = *end;
     *hint = NO_LIMIT;
     *located = 0;
