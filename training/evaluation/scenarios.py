@@ -156,15 +156,17 @@ BEYOND: dict[str, EvaluationScenario] = {
 }
 """Scenarios beyond training by name; plants within ±10 % (TUNING_REGION)."""
 
+FAULTY = ("p1", "p3", "current")
+"""Sensors that fail in a scenario. With p2 wrong no controller holds the band."""
 SENSOR_FAULTS: dict[str, EvaluationScenario] = {
     **{
         f"{channel} {fault}": EvaluationScenario(faults=((channel, fault),))
-        for channel in ("p1", "p3", "current")
+        for channel in FAULTY
         for fault in FAULTS[:-1]
     },
     "p1 and p3 swapped": EvaluationScenario(faults=(("p1", "swapped"), ("p3", "swapped"))),
 }
-"""Ordinary episodes in which a sensor fails, by name. With p2 wrong no controller holds the band."""
+"""Ordinary episodes in which a sensor fails, by name."""
 
 LEVELS = ("small", "typical", "top")
 """Sizes at which an effect of the gap catalogue is tried."""

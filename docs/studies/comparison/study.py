@@ -9,7 +9,7 @@ What is finished is kept in runs/comparison and not run again.
 
 import shutil
 import sys
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 
 import pandas as pd
@@ -18,7 +18,8 @@ from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, t
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.options import parse
 from training.commands import compare
-from training.evaluation.scenarios import BEYOND, SENSOR_FAULTS
+from training.evaluation.scenarios import BEYOND, FAULTY
+from training.evaluation.sensor_faults import FAULTS
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
@@ -74,7 +75,7 @@ def page_table(rows: pd.DataFrame) -> str:
     return table(headings, lines)
 
 
-def scenario_table(rows: pd.DataFrame, scenarios: Iterable[str], controllers: Sequence[str]) -> str:
+def beyond_table(rows: pd.DataFrame) -> str:
     """Share that leaves [%]: a row for each scenario, a column for each controller. The policy's has its
     interval.
 
@@ -83,8 +84,20 @@ def scenario_table(rows: pd.DataFrame, scenarios: Iterable[str], controllers: Se
     forms = dict.fromkeys(CONTROLLERS, "{left_percent:.2g}") | {CONTROLLERS[0]: SHARE}
     cells = [forms[row["controller"]].format(**row) for row in rows.to_dict("records")]
     wide = rows.assign(cell=cells).pivot(index="scenario", columns="controller", values="cell")
-    lines = [[name, *wide.loc[name, list(controllers)]] for name in scenarios]
+    controllers = GROUPS["beyond"][1]
+    lines = [[name, *wide.loc[name, list(controllers)]] for name in BEYOND]
     return table(["scenario", *controllers], lines)
+
+
+def fault_table(rows: pd.DataFrame) -> str:
+    """The policy's violation rate [%]: a row for each fault, a column for each sensor.
+
+    rows: of beyond.csv.
+    """
+    rates = rows.set_index("scenario")["left_percent"].map("{:.2g}".format)
+    lines = [[fault, *(rates[f"{name} {fault}"] for name in FAULTY)] for fault in FAULTS[:-1]]
+    swapped = rates["p1 and p3 swapped"]
+    return table(["fault", *FAULTY], [*lines, ["swapped", swapped, swapped, "–"]])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -107,8 +120,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     rows = pd.concat(beyond)
     rows[BEYOND_COLUMNS].to_csv(options.out / "beyond.csv", index=False, float_format="%.3g")
     blocks = {"controllers": page_table(pd.read_csv(work / "comparison.csv"))}
-    for name, scenarios in (("beyond", BEYOND), ("faults", SENSOR_FAULTS)):
-        blocks[name] = scenario_table(rows, scenarios, GROUPS[name][1])
+    blocks |= {"beyond": beyond_table(rows), "faults": fault_table(rows)}
     fill(options.out / PAGE, blocks)
     if not quick:
         fill(ROOT / "README.md", {"controllers": blocks["controllers"]})
