@@ -94,7 +94,7 @@ def fault_table(rows: pd.DataFrame) -> str:
 
     rows: of beyond.csv.
     """
-    rates = rows.set_index("scenario")["left_percent"].map("{:.2g}".format)
+    rates = {row["scenario"]: f"{row['left_percent']:.2g}" for row in rows.to_dict("records")}
     lines = [[fault, *(rates[f"{name} {fault}"] for name in FAULTY)] for fault in FAULTS[:-1]]
     swapped = rates["p1 and p3 swapped"]
     return table(["fault", *FAULTY], [*lines, ["swapped", swapped, swapped, "–"]])
