@@ -16,7 +16,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 pytest.importorskip("torch")
-pytest.importorskip("statsmodels")
+pytest.importorskip("jinja2")
 
 from controllers.policy import TRAINED
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, read_policy

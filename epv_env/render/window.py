@@ -9,15 +9,16 @@ from epv_env.render import canvas as c
 from epv_env.render.canvas import Canvas, load_pygame
 from epv_env.render.geometry import Snapshot
 from epv_env.render.section import draw_section, draw_section_background
-from epv_env.render.strip import Strip
+from epv_env.render.strip import Strip, draw_strip_background
 from epv_env.reward import BAND_BAR
 
 if TYPE_CHECKING:
     import pygame
 
 WIDTH, HEIGHT = 1280, 720  # size of the frame [px]
-SECTION_CARD = (20, 68, 664, 704)  # card behind the section of the valve [px]
-STRIP_CARD = (680, 68, 1260, 704)  # card behind the chart [px]
+CARDS = ((20, 68, 664, 704), (680, 68, 1260, 704))  # behind the section and behind the chart [px]
+PHASE_BADGE, BAND_BADGE = (20, 18, 124, 50), (900, 18, 1122, 50)  # in the header [px]
+HEADER_Y = 34  # middle of the header's words [px]
 MOVING = 0.01  # stroke fraction from which the piston counts as off its seat [-]
 
 
@@ -38,6 +39,28 @@ def phase(snapshot: Snapshot) -> tuple[str, str]:
     return "Venting", "coil off: p_3 falls until p_1 and p_2 lift the piston"
 
 
+def _draw_background(canvas: Canvas) -> None:
+    canvas.rectangle((0, 0, WIDTH, HEIGHT), c.PAGE)
+    for card in CARDS:
+        canvas.plate(card, 10)
+    draw_section_background(canvas)
+    draw_strip_background(canvas)
+
+
+def _draw_header(canvas: Canvas, snapshot: Snapshot) -> None:
+    name, sentence = phase(snapshot)
+    canvas.rectangle(PHASE_BADGE, c.INK, radius=8)
+    canvas.text(name, (72, HEADER_Y), 22, c.CARD, 0.5)
+    canvas.text(sentence, (138, HEADER_Y), 20, c.INK)
+    deviation = snapshot.p2_bar - snapshot.target_bar
+    canvas.rectangle(BAND_BADGE, c.GOOD if abs(deviation) <= BAND_BAR else c.BAD, radius=8)
+    # The font has no minus sign; its dash is as wide as the plus, the hyphen is not.
+    words = f"p_2 – target  {deviation:+.2f} bar".replace("-", "–")
+    canvas.text(words, (1011, HEADER_Y), 20, c.CARD, 0.5)
+    width = canvas.text(f"{snapshot.time_s:.3f} s", (1258, HEADER_Y), 22, c.INK, 1.0)
+    canvas.text("time", (1250 - width, HEADER_Y), 18, c.MUTED, 1.0)
+
+
 class Renderer:
     """Draws snapshots, one frame each.
 
@@ -46,15 +69,12 @@ class Renderer:
 
     def __init__(self, mode: Literal["rgb_array", "human"], fps: int):
         """fps: frames per second of the window. Without pygame, `draw` raises DependencyNotInstalled."""
-        if mode not in ("rgb_array", "human"):
-            raise ValueError(f"render mode {mode!r} is unknown: use 'rgb_array' or 'human'")
         self.mode = mode
         self.fps = fps
         self.is_open = True
         self._strip = Strip()
-        self._canvas: Canvas | None = None
-        self._window: pygame.Surface | None = None
-        self._clock: pygame.time.Clock | None = None
+        self._drawing: tuple[Canvas, pygame.Surface] | None = None  # with what never moves
+        self._window: tuple[pygame.Surface, pygame.time.Clock] | None = None
 
     def reset(self) -> None:
         """Forget the strip chart's history: a new episode begins."""
@@ -78,61 +98,37 @@ class Renderer:
 
     def __getstate__(self) -> dict[str, Any]:
         """What a copy or a pickle takes along: the history, not the window."""
-        return {**self.__dict__, "_canvas": None, "_window": None, "_clock": None}
+        return {**self.__dict__, "_drawing": None, "_window": None}
 
     def close(self) -> None:
         """Shut the window and free the memory. May be called twice; drawing again starts anew."""
         if self._window is not None:
             load_pygame().display.quit()
-        self._canvas = self._window = self._clock = None
+        self._drawing = self._window = None
 
     def _compose(self, snapshot: Snapshot) -> "pygame.Surface":
-        if self._canvas is None:
-            self._canvas = Canvas(WIDTH, HEIGHT)
-            self._draw_background(self._canvas)
-        canvas = self._canvas
-        canvas.clear()
-        self._draw_header(canvas, snapshot)
+        if self._drawing is None:
+            canvas = Canvas(WIDTH, HEIGHT)
+            _draw_background(canvas)
+            self._drawing = canvas, canvas.surface.copy()
+        canvas, background = self._drawing
+        canvas.surface.blit(background, (0, 0))
+        _draw_header(canvas, snapshot)
         draw_section(canvas, snapshot)
         self._strip.draw(canvas)
         return canvas.frame()
-
-    def _draw_background(self, canvas: Canvas) -> None:
-        canvas.rectangle((0, 0, WIDTH, HEIGHT), c.PAGE)
-        for card in (SECTION_CARD, STRIP_CARD):
-            canvas.rectangle(card, c.CARD, radius=10)
-            canvas.rectangle(card, c.EDGE, radius=10, outline=1)
-        draw_section_background(canvas)
-        self._strip.draw_background(canvas)
-        canvas.keep_as_background()
-
-    def _draw_header(self, canvas: Canvas, snapshot: Snapshot) -> None:
-        name, sentence = phase(snapshot)
-        canvas.rectangle((20, 18, 124, 50), c.INK, radius=8)
-        canvas.text(name, (72, 34), 22, c.CARD, align=0.5)
-        canvas.text(sentence, (138, 34), 20, c.INK)
-        deviation = snapshot.p2_bar - snapshot.target_bar
-        inside = abs(deviation) <= BAND_BAR
-        canvas.rectangle((900, 18, 1122, 50), c.GOOD if inside else c.BAD, radius=8)
-        # The font has no minus sign; its dash is as wide as the plus, the hyphen is not.
-        words = f"p_2 – target  {deviation:+.2f} bar".replace("-", "–")
-        canvas.text(words, (1011, 34), 20, c.CARD, align=0.5)
-        width = canvas.text(f"{snapshot.time_s:.3f} s", (1258, 34), 22, c.INK, align=1.0)
-        canvas.text("time", (1250 - width, 34), 18, c.MUTED, align=1.0)
 
     def _show(self, frame: "pygame.Surface") -> None:
         pygame = load_pygame()
         if self._window is None:
             pygame.display.init()
-            self._window = pygame.display.set_mode((WIDTH, HEIGHT))
+            self._window = pygame.display.set_mode((WIDTH, HEIGHT)), pygame.time.Clock()
             pygame.display.set_caption("Electro-pneumatic protection valve")
-            self._clock = pygame.time.Clock()
         if any(event.type == pygame.QUIT for event in pygame.event.get()):
             self.close()
             self.is_open = False
             return
-        assert self._window is not None
-        assert self._clock is not None
-        self._window.blit(frame, (0, 0))
+        window, clock = self._window
+        window.blit(frame, (0, 0))
         pygame.display.flip()
-        self._clock.tick(self.fps)
+        clock.tick(self.fps)

@@ -41,7 +41,8 @@ from identification.gap.prepare.screened import Finding
 from identification.gap.search.cause_search import HypothesisPool, search_causes
 from identification.gap.search.onset import Onset
 from identification.gap.search.posterior import posterior
-from identification.gap.search.screening import assess_separability, simulate_signatures
+from identification.gap.search.screening import simulate_signatures
+from identification.gap.search.separability import adapted_signatures, assess_separability
 
 NOTICED_WORSENING = 0.05
 """Relative growth of the held-out gap by recalibration that is mentioned [1]."""
@@ -212,7 +213,8 @@ def _searched(problem: FittingProblem, base: Estimate, cache: FitCache) -> Ranki
     runs = linearise(problem, [base], problem.all_runs)[0]
     base_runs = [runs[r] for r in problem.fitted_runs]
     signatures = simulate_signatures(problem, base, problem.plant.causes)
-    separability = assess_separability(base_runs, signatures)
+    adapted = adapted_signatures(problem, base, base_runs, signatures)
+    separability = assess_separability(base_runs, adapted)
     evaluated = evaluate_linearised(problem, base, runs)
     recalibrated = with_own_nuisances(problem, [evaluated], "recalibration: own nuisances", cache)[0]
     pool = HypothesisPool(problem, recalibrated, cache)

@@ -150,8 +150,11 @@ LINES = {
     "model": {"color": "tab:blue"},
     "after": {"color": "tab:blue"},
     "before": {"color": "tab:orange", "linewidth": 1.6},
+    "voltage": {"color": "tab:purple"},
+    "readings": {"color": "0.55"},
+    "trend": {"color": "tab:red"},
 }
-"""Looks of lines by the first word of their names; measured lies under thin models."""
+"""Looks of lines by the first word of their names, one colour for one thing; measured lies below."""
 
 
 def over_time(
@@ -169,7 +172,7 @@ def over_time(
     from matplotlib.figure import Figure
 
     share = sum(heights) if heights else len(rows)
-    figure = Figure(figsize=(9.5, 1.3 * share + 0.9), layout="constrained")
+    figure = Figure(figsize=(7.0, 1.3 * share + 0.9), layout="constrained")
     drawn = figure.subplots(len(rows), 1, sharex=True, squeeze=False, height_ratios=heights)[:, 0]
     for axes, (label, lines) in zip(drawn, rows.items(), strict=True):
         for name, values in lines.items():
@@ -179,6 +182,7 @@ def over_time(
         axes.grid(alpha=0.3)
     drawn[-1].set_xlabel("time [s]")
     lines = {line.get_label(): line for axes in drawn for line in axes.lines}
-    figure.legend(lines.values(), lines.keys(), ncols=4, loc="outside upper center", frameon=False)
+    place = {"ncols": 3, "loc": "outside upper center", "frameon": False, "fontsize": "small"}
+    figure.legend(lines.values(), lines.keys(), **place)
     figure.align_ylabels()
     return figure

@@ -28,11 +28,8 @@ from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.prepare.screened import Finding
 from identification.gap.report.gap_json import write_results
 from identification.gap.search.onset import Span, in_span, likeliest_span, spans_of_causes
-from identification.gap.search.screening import (
-    CauseSignature,
-    assess_separability,
-    simulate_signatures,
-)
+from identification.gap.search.screening import CauseSignature, simulate_signatures
+from identification.gap.search.separability import assess_separability
 from identification.recordings.log_files import Log, read_log
 from identification.recordings.openings import (
     HELD_OUT_EVERY,
@@ -238,8 +235,9 @@ class LoggedValve(Valve):
         """`GreyBox.outputs`: per run an array (3, samples, n) of OUTPUTS [Pa, Pa, A]."""
         return super().outputs(self._where_acting(values), runs)
 
-    def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
-        return super()._one(self._where_acting(values), run)
+    def one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
+        """Plant parameters of the first candidate in a run [SI]."""
+        return super().one(self._where_acting(values), run)
 
     def _where_acting(self, values: Mapping[str, NDArray]) -> dict[str, NDArray]:
         """Values by symbol, those of causes nominal in drives without them, consumption as doubted."""

@@ -45,7 +45,7 @@ SHARE = "{left_percent:.2g} ({left_low:.2g} to {left_high:.2g})"
 COLUMNS = {
     "C1_worst_excursion_bar": ("worst excursion [bar]", "{:.2f}"),
     "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
-    "C2_event_breakdown_mbar": ("breakdown per event [mbar]", "{:.0f}"),
+    "C2_event_breakdown_mbar": ("pressure dip [mbar]", "{:.0f}"),
     "switchings_per_s": ("switchings [1/s]", "{:.1f}"),
     "mean_return": ("return", "{:.0f}"),
     "decision_us": ("decision [µs]", "{:.0f}"),
@@ -65,7 +65,7 @@ def page_table(rows: pd.DataFrame) -> str:
     for row in rows.query("plants == @PLANTS").to_dict("records"):
         cells = [form.format(row[column]) for column, (_, form) in COLUMNS.items()]
         lines.append([str(row["controller"]), SHARE.format(**row), *cells])
-    headings = ["controller", "leaves ±500 mbar [%]", *(heading for heading, _ in COLUMNS.values())]
+    headings = ["controller", "violation rate [%]", *(heading for heading, _ in COLUMNS.values())]
     return table(headings, lines)
 
 

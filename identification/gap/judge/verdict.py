@@ -8,7 +8,7 @@ from identification.gap.fit.fitting_problem import FittingProblem
 from identification.gap.judge.held_out import DiscrepancyReduction
 from identification.gap.locate.localisation import Localisation
 from identification.gap.search.posterior import Posterior
-from identification.gap.search.screening import Separability
+from identification.gap.search.separability import Separability
 
 NO_GAP, KNOWN, AMBIGUOUS = "no_gap", "known", "ambiguous"
 PARTIAL, UNKNOWN = "partial", "unknown"

@@ -19,8 +19,8 @@ from identification.report.page import over_time
 QUANTILE = float(norm.ppf(0.5 + LEVEL / 2))
 """Half the width of a band [standard deviations]."""
 
-BAND = "lightskyblue"
-"""Colour of an interval."""
+CURVE, BAND = "tab:green", "#bfe3bf"
+"""Colours of what is estimated over a state or in time, and of its interval; blue is the model."""
 
 
 def compared_models(diagnosis: Diagnosis) -> dict[str, list[NDArray]]:
@@ -31,7 +31,7 @@ def compared_models(diagnosis: Diagnosis) -> dict[str, list[NDArray]]:
     ranking, best = diagnosis.ranking, diagnosis.best
     models = {"nominal parameters": diagnosis.nominal, "recalibrated": ranking.recalibrated}
     if best:
-        models = {"recalibrated": ranking.recalibrated, f"with {best.hypothesis.title}": best.hypothesis}
+        models = {"recalibrated": ranking.recalibrated, "with the likeliest cause": best.hypothesis}
     return {
         f"{when}: {name}": predict(ranking.problem, model.estimate).residuals
         for when, (name, model) in zip(("before", "after"), models.items(), strict=True)
@@ -41,15 +41,16 @@ def compared_models(diagnosis: Diagnosis) -> dict[str, list[NDArray]]:
 def comparison_figure(diagnosis: Diagnosis, *, every_channel: bool = False) -> Figure:
     """Measured against modelled, before and after, and both errors, on a held-out run.
 
-    It is of the quarter that the correction improves most, since a cause may act in some runs only.
-    every_channel: False for the channel that it improves most.
+    It is the middle one of those that gain at least a tenth of the most: there the cause acts.
+    every_channel: False for the channel that the correction improves most.
     """
     plant, models = diagnosis.ranking.problem.plant, compared_models(diagnosis)
     before, after = models.values()
     gains = [np.mean(b**2 - a**2, axis=1) for b, a in zip(before, after, strict=True)]
-    runs = [r for r, run in enumerate(plant.runs) if run.held_out]
-    runs.sort(key=lambda r: float(np.mean(gains[r])))
-    r = runs[3 * len(runs) // 4]
+    gain = {r: float(np.mean(gains[r])) for r, run in enumerate(plant.runs) if run.held_out}
+    most_gain = max(gain.values())
+    runs = [r for r in sorted(gain, key=gain.__getitem__) if gain[r] >= min(most_gain, most_gain / 10)]
+    r = runs[len(runs) // 2]
     run, most = plant.runs[r], int(np.argmax(gains[r]))
     rows: dict[str, dict[str, NDArray]] = {}
     for c, channel in enumerate(plant.channels):
@@ -111,7 +112,7 @@ def _banded(
 ) -> None:
     """A curve with its interval y ± margin, which does not fall below `least`."""
     axes.fill_between(x, np.maximum(y - margin, least), y + margin, color=BAND, linewidth=0.0)
-    axes.plot(x, y, color="tab:blue", label=label)
+    axes.plot(x, y, color=CURVE, label=label)
     axes.axhline(0.0, color="black", linewidth=0.6)
     axes.grid(alpha=0.3)
 
@@ -119,7 +120,7 @@ def _banded(
 def forcing_figure(plant: GreyBox, forcing: ForcingEstimate) -> Figure:
     """The forcing of a state equation over time, run by run."""
     runs = list(dict.fromkeys(window.run for window in forcing.windows))
-    figure = Figure(figsize=(9.5, 1.5 * len(runs) + 0.8), layout="constrained")
+    figure = Figure(figsize=(7.0, 1.5 * len(runs) + 0.8), layout="constrained")
     panels = figure.subplots(len(runs), 1, squeeze=False)[:, 0]
     for axes, run in zip(panels, runs, strict=True):
         mine = [j for j, window in enumerate(forcing.windows) if window.run == run]

@@ -16,13 +16,12 @@ from scipy.stats import norm
 from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.evidence import EvaluatedHypothesis, variance_inflation
 from identification.gap.fit.gaps import FLOOR
-from identification.gap.fit.laws import in_words
+from identification.gap.fit.laws import COMPONENTS, Law, in_words
 from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
 from identification.gap.judge.verdict import RankedCause
 from identification.gap.locate.localisation import Localisation, MissingTerm
-from identification.gap.search.posterior import variance_inflation
 
 GAP, TERM = "gap.json", "missing_term.json"
 FORMAT = "epv-gap/4"
@@ -136,11 +135,12 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
 def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
     """An entry of `causes`; the last two fields only where the reduction was measured."""
     label, laws = cause.hypothesis.label, cause.hypothesis.estimate.laws
+    differing = [(law, components) for law, components, _ in differing_laws(diagnosis, cause.hypothesis)]
     entry: dict[str, Any] = {
         "effects": list(cause.effects),
         "probability": cause.probability,
         "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
-        "form": in_words(laws),
+        "form": in_words(differing),
         "laws": [
             {
                 "effect": law.cause.label,
@@ -298,6 +298,31 @@ def parameter_intervals(
         low, high = sorted((p.low, p.high))
         intervals[p.symbol] = value, max(value - margin, low), min(value + margin, high)
     return intervals
+
+
+def differing_laws(
+    diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis
+) -> list[tuple[Law, NDArray, NDArray]]:
+    """Open laws that differ from the assumed one: at some knot the band of g does not hold 0.
+
+    Each with its components (m,) and the standard deviation of g at the knots (knots,) [1].
+    """
+    problem, estimate = diagnosis.ranking.problem, hypothesis.estimate
+    if not estimate.laws:
+        return []
+    covariance, quantile = parameter_covariance(diagnosis, hypothesis), norm.ppf(0.5 + LEVEL / 2)
+    symbols = [p.symbol for p in problem.parameters(estimate)]
+    found = []
+    for law, components in estimate.laws:
+        growth, size = law.growth(components), law.cause.sizes[0]
+        places = [symbols.index(p.symbol) for p in (*law.parameters, size)]
+        value = problem.values(estimate)[size.symbol] - size.nominal
+        # A larger size with a smaller g is the same strength: both count together.
+        slopes = np.column_stack([COMPONENTS, (1.0 + growth) / value])
+        sd = np.sqrt(np.diag(slopes @ covariance[np.ix_(places, places)] @ slopes.T))
+        if np.any(np.abs(growth) > quantile * sd):
+            found.append((law, components, sd))
+    return found
 
 
 def parameter_covariance(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> NDArray:

@@ -8,7 +8,6 @@ from identification.block_bootstrap import LEVEL
 from identification.gap.diagnosis import MENTIONED_PROBABILITY, Diagnosis
 from identification.gap.fit.evidence import EvaluatedHypothesis
 from identification.gap.fit.gaps import FLOOR, RegimeGap
-from identification.gap.fit.laws import COMPONENTS
 from identification.gap.judge.verdict import NO_GAP
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.report.figures import (
@@ -18,9 +17,9 @@ from identification.gap.report.figures import (
     missing_term_figure,
 )
 from identification.gap.report.gap_json import (
+    differing_laws,
     discrepancy,
     drawn_term,
-    parameter_covariance,
     parameter_intervals,
     remainder,
 )
@@ -198,21 +197,11 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
 
 
 def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Block]:
-    """The open laws of a hypothesis over their states, beside the law that is assumed."""
+    """The laws that differ from the assumed one over their states, beside it."""
     problem, estimate = diagnosis.ranking.problem, hypothesis.estimate
-    if not estimate.laws:
+    laws = [(law, law.growth(z), sd) for law, z, sd in differing_laws(diagnosis, hypothesis)]
+    if not laws:
         return []
-    covariance = parameter_covariance(diagnosis, hypothesis)
-    symbols = [p.symbol for p in problem.parameters(estimate)]
-    drawn = []
-    for law, components in estimate.laws:
-        growth, size = law.growth(components), law.cause.sizes[0]
-        places = [symbols.index(p.symbol) for p in (*law.parameters, size)]
-        value = problem.values(estimate)[size.symbol] - size.nominal
-        # A larger size with a smaller g is the same strength: both count together.
-        slopes = np.column_stack([COMPONENTS, (1.0 + growth) / value])
-        sd = np.sqrt(np.diag(slopes @ covariance[np.ix_(places, places)] @ slopes.T))
-        drawn.append((law, growth, sd))
     values, plant = problem.candidate(estimate), prepared(problem.plant)
     traces = plant.law_states(values, problem.fitted_runs[0])
     units = {name: (trace.unit, trace.scale) for name, trace in traces.items()}
@@ -220,7 +209,7 @@ def drawn_laws(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> list[Bl
         f"Strength of the cause over the state that it follows ({LEVEL_TEXT} band), relative to its "
         "fitted size; dashed: the law that the catalogue assumes."
     )
-    return [Picture(figure=law_figure(drawn, units), caption=caption)]
+    return [Picture(figure=law_figure(laws, units), caption=caption)]
 
 
 def discrepancy_table(diagnosis: Diagnosis) -> Table:

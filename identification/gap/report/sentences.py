@@ -14,7 +14,7 @@ from identification.gap.judge.held_out import LEAST_GAP_CLOSED, RECALIBRATED
 from identification.gap.judge.verdict import NO_GAP, UNKNOWN, RankedCause
 from identification.gap.locate.localisation import Localisation
 from identification.gap.plant import FreeParameter, StateEquation
-from identification.gap.report.gap_json import discrepancy, remainder, share_left
+from identification.gap.report.gap_json import differing_laws, discrepancy, remainder, share_left
 from identification.report.page import templates
 
 MENTIONED_DISCREPANCY = 0.3
@@ -59,7 +59,9 @@ def words_of(diagnosis: Diagnosis) -> Words:
         "gap": gap_text,
         "gap_with_interval": gap_with_interval,
         "listed": lambda words: listed(list(words)),
-        "laws": laws_in_words,
+        "laws": lambda hypothesis: laws_in_words(
+            [(law, components) for law, components, _ in differing_laws(diagnosis, hypothesis)]
+        ),
         "closed": lambda cause: share_text(diagnosis.share_closed(cause)),
         "words": lambda label: in_words(diagnosis, label),
         "inclusion": lambda name: probability_text(diagnosis.ranking.inclusion[name]),
@@ -150,17 +152,20 @@ def look_alikes(diagnosis: Diagnosis, cause: RankedCause) -> str:
 
 
 def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
-    """Fitted parameters at an end of their physical range, of the model to use and of named causes."""
+    """Fitted parameters at an end of their physical range, of the model to use and of named causes.
+
+    A cause's parameter that stays at its nominal value adds nothing, so its end tells nothing.
+    """
     problem = diagnosis.ranking.problem
-    named = {cause.hypothesis.title: cause.hypothesis for cause in diagnosis.conclusion.ambiguity_set}
-    models = {diagnosis.model.title or diagnosis.model_label: diagnosis.model} | named
+    named = {cause.hypothesis.label: cause.hypothesis for cause in diagnosis.conclusion.ambiguity_set}
+    models = {diagnosis.model_label: diagnosis.model} | named
     estimates = {name: hypothesis.estimate for name, hypothesis in models.items()}
     ends = [
         f"{name}: {p.title} is at an end of its physical range ({quantity(value, p.unit)})"
         for name, estimate in estimates.items()
         for p in (*problem.plant.parameters, *estimate.hypothesis.cause_parameters)
         for value in [problem.values(estimate)[p.symbol]]
-        if at_an_end(p, value)
+        if at_an_end(p, value) and not (p.trials and _meet(p, value, p.nominal))
     ]
     return ends + [
         f"{name}: its strength may follow {law.argument} even more than the fit allows"
@@ -172,8 +177,11 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
 
 def at_an_end(parameter: FreeParameter, value: float) -> bool:
     """Whether a value [SI] lies at an end of its parameter's physical range."""
-    apart = min(abs(value - parameter.low), abs(value - parameter.high))
-    return apart <= BOUND_TOLERANCE * abs(parameter.high - parameter.low)
+    return _meet(parameter, value, parameter.low) or _meet(parameter, value, parameter.high)
+
+
+def _meet(parameter: FreeParameter, value: float, other: float) -> bool:
+    return abs(value - other) <= BOUND_TOLERANCE * abs(parameter.high - parameter.low)
 
 
 def sizes_text(diagnosis: Diagnosis, cause: RankedCause) -> str:

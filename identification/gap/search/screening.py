@@ -1,4 +1,4 @@
-"""Screening: which causes are worth a refit, from which values, and which look alike, by simulation."""
+"""Screening: which causes are worth a refit, and from which values, by simulation."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,10 +17,6 @@ from identification.gap.fit.variable_projection import (
     normal_equations,
 )
 from identification.gap.plant import Cause
-
-DETECTABLE_SIGNATURE = 3.0
-"""Length of a signature [noise deviations] below which the recordings do not show a cause at its usual
-size; an announcement only, except that such a cause resembles no other."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,41 +74,6 @@ class CauseSignature:
         }
 
 
-@dataclass(frozen=True, kw_only=True)
-class Separability:
-    """Signatures of n causes, less what calibrated and nuisance parameters absorb of them."""
-
-    labels: tuple[str, ...]
-    """Labels of the causes, (n,)."""
-    signature_norms: NDArray
-    """Length of each signature at the cause's first trial value, (n,) [noise deviations]."""
-    correlation: NDArray
-    """Correlations of the signatures, (n, n) [1]: near 1 or -1 for causes that look alike."""
-
-    @property
-    def absorbed(self) -> tuple[str, ...]:
-        """Causes that recalibration hides."""
-        pairs = zip(self.labels, self.signature_norms, strict=True)
-        return tuple(label for label, norm in pairs if norm < DETECTABLE_SIGNATURE)
-
-    def twins(self, label: str) -> tuple[str, ...]:
-        """Detectable causes that the campaign hardly tells from one cause, the most alike first.
-
-        Their signatures correlate above 0.98; an announcement only, no verdict uses it.
-        """
-        if label not in self.labels:
-            return ()
-        row = np.abs(self.correlation[self.labels.index(label)])
-        order = np.argsort(-row, kind="stable")
-        return tuple(
-            self.labels[i]
-            for i in order
-            if row[i] > 0.98
-            and self.labels[i] != label
-            and self.signature_norms[i] >= DETECTABLE_SIGNATURE
-        )
-
-
 def with_cause(
     problem: FittingProblem, base: Estimate, cause: Cause, values: Mapping[str, float]
 ) -> Estimate:
@@ -132,15 +93,22 @@ def simulate_signatures(
         for trial in range(max(len(p.trials) for p in cause.sizes)):
             at = {p.symbol: p.trials[min(trial, len(p.trials) - 1)] for p in cause.sizes}
             trials.append((cause, with_cause(problem, base, cause, at)))
-    residuals = problem.residuals([base, *(estimate for _, estimate in trials)], problem.fitted_runs)
+    changes = changes_of(problem, base, [estimate for _, estimate in trials])
     return [
-        CauseSignature(
-            cause=cause,
-            estimate=estimate,
-            changes=[block[:, 0] - block[:, 1 + k] for block in residuals],
-        )
-        for k, (cause, estimate) in enumerate(trials)
+        CauseSignature(cause=cause, estimate=estimate, changes=own)
+        for (cause, estimate), own in zip(trials, changes, strict=True)
     ]
+
+
+def changes_of(
+    problem: FittingProblem, base: Estimate, estimates: Sequence[Estimate]
+) -> list[list[NDArray]]:
+    """How the outputs of each estimate differ from the base's: per fitted run, (values,) [noise
+    deviations]; all are simulated side by side."""
+    if not estimates:
+        return []
+    residuals = problem.residuals([base, *estimates], problem.fitted_runs)
+    return [[block[:, 0] - block[:, 1 + k] for block in residuals] for k in range(len(estimates))]
 
 
 def screen_causes(
@@ -194,12 +162,10 @@ def simulated_starts(
     base_runs: Sequence[LinearisedRun],
     estimates: Sequence[Estimate],
 ) -> list[Start]:
-    """Starts at estimates that add causes to the base; all are simulated side by side."""
+    """Starts at estimates that add causes to the base."""
     if not estimates:
         return []
-    residuals = problem.residuals([base, *estimates], problem.fitted_runs)
-    changes = [[block[:, 0] - block[:, 1 + k] for block in residuals] for k in range(len(estimates))]
-    changed = ChangedRuns(base_runs, changes)
+    changed = ChangedRuns(base_runs, changes_of(problem, base, estimates))
     return [
         _adapted(problem, base, estimate, changed.explained(k)) for k, estimate in enumerate(estimates)
     ]
@@ -269,7 +235,7 @@ def best_pairs(
 
     base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
     """
-    gram, moment = _without_base(base_runs, signatures)
+    gram, moment = without_base(base_runs, signatures)
     shares = np.array([signature.shares for signature in signatures])
     found = []
     for pair in combinations(range(len(signatures)), 2):
@@ -290,7 +256,7 @@ def best_pairs(
     ]
 
 
-def _without_base(
+def without_base(
     base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
 ) -> tuple[NDArray, NDArray]:
     """Gram matrix (n, n) of n signatures and their products with the residual (n,), the base's own
@@ -300,23 +266,3 @@ def _without_base(
         for r, run in enumerate(base_runs)
     ]
     return _without_first(normal_equations(runs), base_runs[0].slopes.shape[1])[:2]
-
-
-def assess_separability(
-    base_runs: Sequence[LinearisedRun], signatures: Sequence[CauseSignature]
-) -> Separability:
-    """Separability of the causes at their first trial values.
-
-    base_runs: the base estimate linearised in the fitted runs. signatures: beside the same base.
-    """
-    first: dict[str, CauseSignature] = {}
-    for signature in signatures:
-        first.setdefault(signature.cause.label, signature)
-    gram, _ = _without_base(base_runs, list(first.values()))
-    norms = np.sqrt(np.maximum(np.diag(gram), 0.0))
-    divisors = np.maximum(norms, np.sqrt(np.finfo(float).tiny))
-    return Separability(
-        labels=tuple(first),
-        signature_norms=norms,
-        correlation=gram / np.outer(divisors, divisors),
-    )

@@ -111,6 +111,8 @@ def test_the_law_is_said_drawn_and_written():
     ends = {"effect": "drag", "argument": "s", "low": law.low, "high": law.high}
     assert as_json(found)["causes"][0]["laws"] == [ends | {"growth": growth.tolist()}]
     assert len(drawn_laws(found, best)) == 1
+    wide = replace(best, covariance=1e6 * best.covariance)
+    assert drawn_laws(found, wide) == [], "its band holds the law that is assumed"
 
 
 def test_components_are_orthogonal_and_hold_the_prior():

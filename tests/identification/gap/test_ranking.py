@@ -86,7 +86,7 @@ def test_a_true_cause_that_leaves_a_little_is_named_with_its_probability():
     text = verdict_sentence(found)[1]
     assert text.startswith("coupling closes 9")
     assert "that this is the cause has a probability of" in text
-    assert "Add coupling with coupling = " in text
+    assert "Add it with coupling = " in text
 
 
 def test_a_true_cause_that_leaves_much_is_less_sure_and_to_be_added():

@@ -10,6 +10,7 @@ import pytest
 from docs.examples.tank import Tank, virtual_recordings
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose
+from identification.gap.fit.evidence import variance_inflation
 from identification.gap.judge.verdict import NO_GAP, PARTIAL, UNKNOWN
 from identification.gap.report.gap_json import (
     GAP,
@@ -21,7 +22,6 @@ from identification.gap.report.gap_json import (
     write_results,
 )
 from identification.gap.report.sentences import verdict_sentence
-from identification.gap.search.posterior import variance_inflation
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 
@@ -63,7 +63,7 @@ def test_a_leak_beside_a_disturbance_is_named_and_to_be_added():
     assert found.helps
     assert "leak" in found.model.names
     assert verdict_sentence(found)[0] == "doubt"
-    assert "Add leak with" in verdict_sentence(found)[1]
+    assert "Add it with leak =" in verdict_sentence(found)[1]
     content = json.loads(json.dumps(as_json(found), allow_nan=False))
     assert content["causes"][0]["effects"] == ["leak"]
     assert 0.0 < content["left"]["fraction"] < 0.5
@@ -86,14 +86,14 @@ def test_partial_says_what_to_add_what_it_closes_and_what_remains():
         "leak closes 76 % (70 to 81 %) of the gap on recordings never fitted to; that "
     )
     assert "this is the cause has a probability of" in text
-    assert "Add leak with leak = " in text
+    assert "Add it with leak = " in text
     assert "24 % (19 to 30 %) of the gap remains, most likely in f1 of tank (" in text
 
 
 @pytest.mark.parametrize(
     ("of", "closed", "said", "unsaid"),
     [
-        (partial, (0.0, 0.1, 0.3), "do not add", "Add leak"),
+        (partial, (0.0, 0.1, 0.3), "do not add", "Add it"),
         (unknown, (0.0, 0.1, 0.3), "do not add", "Add leak"),
         (unknown, (0.3, 0.44, 0.48), "closes 44 % (30 to 48 %) of the gap", "Add leak"),
         (unknown, (0.7, 0.74, 0.8), "Add leak all the same: it closes 74 % (70 to", "do not add"),

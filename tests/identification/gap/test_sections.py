@@ -21,6 +21,7 @@ from identification.gap.report.sentences import (
     verdict_sentence,
     words_of,
 )
+from identification.gap.search.onset import Onset
 from identification.report.page import Picture, Section, Table
 from tests.identification.gap.tanks import TANKS, diagnosed
 
@@ -61,7 +62,7 @@ def test_one_screen_says_what_shows_it_and_says_what_next_and_all_else_is_folded
 @pytest.mark.parametrize(
     ("name", "models"),
     [
-        ("known", ["before: recalibrated", "after: with leak"]),
+        ("known", ["before: recalibrated", "after: with the likeliest cause"]),
         ("no_gap", ["before: nominal parameters", "after: recalibrated"]),
     ],
 )
@@ -130,12 +131,12 @@ def test_rivals_are_named_together_with_what_would_decide():
     )
 
 
-def at_end(found: Diagnosis) -> Diagnosis:
-    """The diagnosis with the leak as large as can be."""
+def at_end(found: Diagnosis, end: str = "high") -> Diagnosis:
+    """The diagnosis with the leak at an end of its range."""
     best, *others = found.conclusion.ambiguity_set
     estimate = best.hypothesis.estimate
     leak = estimate.hypothesis.parameters[0]
-    vector = np.array([*estimate.vector[:-1], leak.high / leak.scale])
+    vector = np.array([*estimate.vector[:-1], getattr(leak, end) / leak.scale])
     changed = replace(best.hypothesis, estimate=replace(estimate, vector=vector))
     conclusion = replace(found.conclusion, ambiguity_set=[replace(best, hypothesis=changed), *others])
     return replace(found, conclusion=conclusion)
@@ -147,8 +148,18 @@ def test_a_size_at_an_end_of_its_range_is_a_warning():
     assert parameters_at_bounds(at_end(found)) == [
         "leak: leak is at an end of its physical range (0.0500 1/s)"
     ]
+    assert parameters_at_bounds(at_end(found, "low")) == [], "no leak at all says nothing"
     assert [v.status for v in sections(at_end(found))[0].verdicts] == ["doubt", "why"]
     assert [v.status for v in sections(found)[0].verdicts] == ["good"]
+
+
+def test_an_onset_is_the_interval_of_its_drives():
+    def said(*args):
+        return words_of(replace(diagnosed("known"), onsets={"leak": Onset(*args)})).what
+
+    unsure = said("d-7", 0.33, None, "d-4", "d-9")
+    assert "It acts from a drive between d-4 and d-9 on (95 %), most likely d-7 (33 %)." in unsure
+    assert "It acts from d-5 on (98 %), until d-6, in which" in said("d-5", 0.98, "d-6", "d-5", "d-5")
 
 
 def test_tables_hold_the_figures_of_the_file():

@@ -3,6 +3,8 @@
 import json
 import re
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,7 +17,7 @@ from identification.monitor.features import CONDITIONS, FEATURES, RISE, OpeningR
 from identification.monitor.model import LINEAR, RETURN, SHIPPED, TERMS, MonitorModel
 from identification.monitor.monitor import Monitor
 from identification.recordings.log_files import Log, read_log
-from training.commands.monitor import follow, sentences
+from training.commands.monitor import follow, pictures, verdicts
 from training.drives import drives, write_log
 
 N = len(FEATURES)
@@ -169,7 +171,8 @@ def test_a_state_that_is_not_finite_restarts_and_says_so() -> None:
     assert monitor.restarts == 1
     assert np.isfinite(monitor.log_odds)
     log = Log(name="", temperature=293.0, pressure=1e5, period=5e-3, drives=())
-    assert "Restarts because its state was not finite: 1." in sentences(monitor, log, [])
+    said = [verdict.text for verdict in verdicts(monitor, log, [])]
+    assert said[-1] == "Restarts because its state was not finite: 1."
 
 
 def test_what_is_shipped_finds_a_change_and_its_return() -> None:
@@ -183,6 +186,12 @@ def test_what_is_shipped_finds_a_change_and_its_return() -> None:
         assert len(monitor.changes) == part
     assert [next(iter(c.causes)) for c in monitor.changes] == ["eddy_current", RETURN]
     assert [c.onset for c in monitor.changes] == pytest.approx([60.0, 120.0], abs=6.0)
+    log: Any = SimpleNamespace(name="log", drives=[SimpleNamespace(file=f"d-{k}") for k in range(6)])
+    ends = [30.0 * k for k in range(1, 7)]
+    changed, gone, *_ = (verdict.text for verdict in verdicts(monitor, log, ends))
+    assert re.match(r"The valve has changed, since d-[12], \d+ s .*> 99 %\). The cause is eddy", changed)
+    assert gone.startswith("The latest change is gone, since d-")
+    assert len(pictures(monitor, log, ends)) == 1
 
 
 def test_a_warm_winding_and_another_supply_are_no_change() -> None:
