@@ -4,7 +4,7 @@ fail, worn valves.
     python -m docs.studies.comparison.study
 
 writes comparison.csv, differences.csv, beyond.csv, comparison.png, and the tables of both README.md.
-What is finished is kept in runs/comparison and not run again.
+What is finished is kept in runs/comparison/CODE and not run again.
 """
 
 import shutil
@@ -103,7 +103,7 @@ def fault_table(rows: pd.DataFrame) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
-    work = (options.out if options.quick else ROOT / "runs") / "comparison"
+    work = options.work / "comparison"
     quick, beyond = options.quick, []
     work.mkdir(parents=True, exist_ok=True)
     run_compare(work, CONTROLLERS, "--episodes", QUICK if quick else EPISODES, quick=quick)

@@ -3,7 +3,7 @@
     python -m docs.studies.coverage.study
 
 writes coverage.json and the table of README.md. The truth of each virtual campaign is
-Table 12; its noise is its own. Finished campaigns are kept in runs/coverage and not repeated.
+Table 12; its noise is its own. Finished campaigns are kept in runs/coverage/CODE and not repeated.
 """
 
 import sys
