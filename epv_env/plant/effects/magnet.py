@@ -13,17 +13,18 @@ from epv_env.plant.primitives import QUARTER_PI, inlined
 def steepness(u, knee):
     """Reciprocal of the differential inductance relative to that of linear iron [-].
 
-    u: level of saturation. knee: w_sat. (1 + u)^2 is that of the Froelich-Kennelly curve.
+    u: level of saturation. knee: w_sat. (1 + u)^2 is that of the Froelich-Kennelly curve, of which
+    iron that is saturated throughout leaves an eighth.
     """
     curve = (1.0 + u) * (1.0 + u)
-    return curve + knee * (1.0 + 16.0 * u * u * u * u - curve)
+    return curve + knee * (min(1.0 + 16.0 * u * u * u * u, 8.0 * curve) - curve)
 
 
 def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
     """Greatest reciprocal of the coil's differential inductance [1/H], shape as the parameters."""
     reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
     level = p["sMV"] * p["N"] / p["RML"]  # at 1 A, the end of Table 1's range
-    return reluctance / p["N"] ** 2 * np.maximum(steepness(level, p["w_sat"]), 1.0)
+    return reluctance / p["N"] ** 2 * np.maximum(np.vectorize(steepness)(level, p["w_sat"]), 1.0)
 
 
 MAGNETIC_SATURATION = Effect(
@@ -32,7 +33,7 @@ MAGNETIC_SATURATION = Effect(
     strength=("saturation",),
     form=(
         "Φ = N I/(Rm + N I sMV); force from its coenergy, N² I²/(Rm² μ0 A) (ln(1+u) − u/(1+u))/u², "
-        "u = sMV N I/Rm; 1/L = Rm/N² ((1 − w_sat)(1+u)² + w_sat (1 + 16 u⁴))"
+        "u = sMV N I/Rm; 1/L = Rm/N² ((1 − w_sat)(1+u)² + w_sat min(1 + 16 u⁴, 8 (1+u)²))"
     ),
     source="Fröhlich 1881, Kennelly 1891; iron saturates at 1.6–2 T, that is 1.3–1.6·10⁻⁴ V s over A_MB",
     sizes=(
