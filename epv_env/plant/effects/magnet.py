@@ -17,14 +17,16 @@ def steepness(u, knee):
     iron that is saturated throughout leaves an eighth.
     """
     curve = (1.0 + u) * (1.0 + u)
-    return curve + knee * (min(1.0 + 16.0 * u * u * u * u, 8.0 * curve) - curve)
+    beyond, most = 1.0 + 16.0 * u * u * u * u, 8.0 * curve
+    beyond = most + (beyond < most) * (beyond - most)  # the smaller one, of arrays and in C, too
+    return curve + knee * (beyond - curve)
 
 
 def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
     """Greatest reciprocal of the coil's differential inductance [1/H], shape as the parameters."""
     reluctance = p["RML"] + p["xMVmax"] / (p["mu0"] * QUARTER_PI * p["dMB"] ** 2)
     level = p["sMV"] * p["N"] / p["RML"]  # at 1 A, the end of Table 1's range
-    return reluctance / p["N"] ** 2 * np.maximum(np.vectorize(steepness)(level, p["w_sat"]), 1.0)
+    return reluctance / p["N"] ** 2 * np.maximum(steepness(level, p["w_sat"]), 1.0)
 
 
 MAGNETIC_SATURATION = Effect(

@@ -135,12 +135,11 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
 def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
     """An entry of `causes`; the last two fields only where the reduction was measured."""
     label, laws = cause.hypothesis.label, cause.hypothesis.estimate.laws
-    differing = [(law, components) for law, components, _ in differing_laws(diagnosis, cause.hypothesis)]
     entry: dict[str, Any] = {
         "effects": list(cause.effects),
         "probability": cause.probability,
         "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
-        "form": in_words(differing),
+        "form": form_in_words(diagnosis, cause.hypothesis),
         "laws": [
             {
                 "effect": law.cause.label,
@@ -298,6 +297,11 @@ def parameter_intervals(
         low, high = sorted((p.low, p.high))
         intervals[p.symbol] = value, max(value - margin, low), min(value + margin, high)
     return intervals
+
+
+def form_in_words(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> str:
+    """How the strengths of causes follow states otherwise than the catalogue assumes."""
+    return in_words([(law, z) for law, z, _ in differing_laws(diagnosis, hypothesis)])
 
 
 def differing_laws(
