@@ -60,12 +60,12 @@ UNKNOWN_DEVIATION = 0.45
 LEAST_HEAD = 0.2
 """p1 - p2 below which the supply does not raise the circuit [bar]."""
 TOLERATED = BAND_BAR - 0.1
-"""Expected breakdown that needs no reserve [bar]: what the band allows, less the scatter at rest."""
+"""Expected pressure dip that needs no reserve [bar]: what the band allows, less the scatter at rest."""
 MOST_RESERVE = 0.3
 """Largest reserve [bar]: above it a pulse's scatter would leave the band upwards."""
 BREAKDOWN_MEMORY, REACHED = 60.0, 0.05
-"""Time in which the memory of a breakdown fades by 1/e [s]; distance below the target from which the
-target counts as reached [bar]: the way up to it is no breakdown."""
+"""Time in which the memory of a pressure dip fades by 1/e [s]; distance below the target from which the
+target counts as reached [bar]: the way up to it is no dip."""
 FILTER_TIME = 0.025
 """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
@@ -92,7 +92,7 @@ LEARNT = (
     Quantity("after_period", "bar", 0.0, 0.3, 4.0),  # the same after one period more off
     Quantity("after_period_early", "bar", 0.0, 0.3, 4.0),  # the same if the valve opens early
     Quantity("reserve", "bar", 0.0, 0.1, 4.0),  # how much higher p2 is held where the valve is slow
-    Quantity("deepest", "bar", 0.0, 0.25, 4.0),  # deepest breakdown lately
+    Quantity("deepest", "bar", 0.0, 0.25, 4.0),  # deepest pressure dip lately
     Quantity("head", "bar", 0.0, 2.0, 2.0),  # p1 - p2
     Quantity("margin", "bar", 0.0, 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
     Quantity("remaining", "s", 0.0, 0.02, 2.0),

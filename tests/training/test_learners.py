@@ -151,7 +151,7 @@ def test_seeds_are_ranked_by_violations_then_return_and_none_is_trained_twice(tm
     [(1.0, 3.0, "is better than"), (-3.0, -1.0, "is worse than"), (-1.0, 1.0, "cannot be told from")],
 )
 def test_the_verdict_says_what_the_interval_allows(low, high, words):
-    scores = ["return", "share that leaves [%]", "switchings [1/s]"]
+    scores = ["return", "violation rate [%]", "switchings [1/s]"]
     paired = pd.DataFrame(
         {"controller": "PPO", "score": scores, "difference": 0.5, "low": low, "high": high}
     )

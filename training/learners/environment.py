@@ -29,8 +29,8 @@ REWARD_SCALE = 0.08
 """Factor of the rewards that PPO sees [1]: the critic's errors become about as large as the actor's
 advantages, whose gradients PPO clips together."""
 FACTORS = {"band": 2.0, "tracking": 1.2, "breakdown": 1.4, "switching": 2.0}
-"""Prices of the training, relative to the reward's: with the reward's own, less error and breakdown
-would be bought by more switchings, and rare violations would hardly count."""
+"""Prices of the training, relative to the reward's: with the reward's own, smaller errors and
+pressure dips would be bought by more switchings, and rare violations would hardly count."""
 BAND_BAR = 0.3
 """Half-width of the band that is priced in training [bar]: the policy keeps a margin."""
 

@@ -47,7 +47,7 @@ BEYOND_COLUMNS = [
     "scenario", "controller", "left_percent", "left_low", "left_high", "C1_worst_excursion_bar",
 ]  # fmt: skip
 SHARE = "{left_percent:.2g} ({left_low:.2g} to {left_high:.2g})"
-"""Share that leaves the band, with its interval [%]."""
+"""Violation rate with its interval [%]."""
 COLUMNS = {
     "C1_worst_excursion_bar": ("worst excursion [bar]", "{:.2f}"),
     "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
@@ -76,7 +76,7 @@ def page_table(rows: pd.DataFrame) -> str:
 
 
 def beyond_table(rows: pd.DataFrame) -> str:
-    """Share that leaves [%]: a row for each scenario, a column for each controller. The policy's has its
+    """Violation rate [%]: a row for each scenario, a column for each controller. The policy's has its
     interval.
 
     rows: of beyond.csv.
