@@ -188,11 +188,11 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
     }
     rest = probability_table("", others, "").rows
     return Table(
-        columns=["Cause", "probability", f"size ({LEVEL_TEXT})", "closes", "looks like"],
+        columns=["Cause", "probability", f"size ({LEVEL_TEXT})", "share closed", "indistinguishable from"],
         rows=[*rows, *([*row, "-", "-", "-"] for row in rest)],
-        caption=f"Causes with a probability of {MENTIONED_PROBABILITY:.0%} or more. 'Looks like': "
-        "causes that these recordings hardly tell apart from this one, with the correlation of both "
-        "effects; from the model's sensitivities alone, whatever the residual.",
+        caption=f"Causes with a probability of {MENTIONED_PROBABILITY:.0%} or more. Share closed: "
+        "of the gap, on recordings never fitted to. Indistinguishable: these recordings would hardly "
+        "tell both causes apart, whatever the residual; with the correlation of what they change.",
     )
 
 
