@@ -81,8 +81,10 @@ def sections(
 
 def _verdict(diagnosis: Diagnosis, words: Words, next_experiment: str) -> Section:
     """The first screen: what it is and how sure, why it is in doubt, what shows it, what next."""
+    nothing_missing = diagnosis.conclusion.verdict == NO_GAP
     verdicts = [
         Verdict(status=words.status, text=words.what),
+        *([Verdict(status="note", text=words.hidden)] if nothing_missing else []),
         *(Verdict(status="why", text=doubt) for doubt in words.doubts),
         *([Verdict(status="next", text=next_experiment)] if next_experiment else []),
     ]

@@ -47,7 +47,8 @@ class Words:
 def verdict_sentence(diagnosis: Diagnosis) -> tuple[str, str]:
     """Status ('good', 'doubt' or 'bad'), and the verdict with the reasons of its doubt."""
     words = words_of(diagnosis)
-    return words.status, " ".join([words.what, *words.doubts])
+    hidden = [words.hidden] if diagnosis.conclusion.verdict == NO_GAP else []
+    return words.status, " ".join([words.what, *hidden, *words.doubts])
 
 
 def words_of(diagnosis: Diagnosis) -> Words:
