@@ -82,9 +82,9 @@ def _follow_events(m, consuming, shortfall, period):
 
     An event begins with the period in which consumption rises above EVENT_FLOW. It ends where the next
     one begins, or AFTERMATH after consumption has fallen below again, or with the episode. Its pressure
-    dip is the largest shortfall in that time. Its recovery is the time from its beginning until p2 is back
-    above target - SHORTFALL_BAR after the first dip below, or to the event's end if that comes first;
-    0 if no dip begins within ONSET.
+    dip is the largest shortfall in that time. Its recovery is the time from its beginning until p2 is
+    back above target - SHORTFALL_BAR after the first dip below, or to the event's end if that comes
+    first; 0 if no dip begins within ONSET.
     """
     if consuming and m.consuming == 0.0:
         _end_event(m)

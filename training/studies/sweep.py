@@ -209,7 +209,8 @@ def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
                     {
                         "controller": controller,
                         "changed": f"{design}, ends of their ranges" if ends else design,
-                        "tried": len(some), "hurt": len(hurt), "highest violation rate [%]": "; ".join(named) or "–",
+                        "tried": len(some), "hurt": len(hurt),
+                        "highest violation rate [%]": "; ".join(named) or "–",
                     }
                 )  # fmt: skip
     return pd.DataFrame(rows)

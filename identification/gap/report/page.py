@@ -189,8 +189,9 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
         "not in the catalogue": ranking.unknown,
     }
     rest = probability_table("", others, "").rows
+    columns = ("Cause", "probability", f"size ({LEVEL_TEXT})", "share closed", "indistinguishable from")
     return Table(
-        columns=["Cause", "probability", f"size ({LEVEL_TEXT})", "share closed", "indistinguishable from"],
+        columns=columns,
         rows=[*rows, *([*row, "-", "-", "-"] for row in rest)],
         caption=f"Causes with a probability of {MENTIONED_PROBABILITY:.0%} or more. Share closed: "
         "of the gap, on recordings never fitted to. Indistinguishable: these recordings would hardly "
