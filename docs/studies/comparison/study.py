@@ -1,4 +1,4 @@
-"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, sensors that
+"""Compare five controllers: random episodes on three plant sets, scenarios beyond training, sensors that
 fail, worn valves.
 
     python -m docs.studies.comparison.study
@@ -28,10 +28,8 @@ CONTROLLERS = (
     "adaptive pulse",
     "extrapolating hysteresis",
     "PWM",
-    "informed pulse",
 )
-"""The learned one, then what it is built on, classic ones, and one that knows each valve's
-parameters."""
+"""The learned one, then what it is built on, and classic ones."""
 EPISODES, QUICK = 4096, 4
 """Episodes in each plant set, and under --quick."""
 PLANTS = "sensitive_ten_percent"
