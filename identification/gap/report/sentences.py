@@ -165,7 +165,8 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
         for name, estimate in estimates.items()
         for p in (*problem.plant.parameters, *estimate.hypothesis.cause_parameters)
         for value in [problem.values(estimate)[p.symbol]]
-        if at_an_end(p, value) and not (p.trials and _meet(p, value, p.nominal))
+        if at_an_end(p, value)
+        and not (p in estimate.hypothesis.cause_parameters and _meet(p, value, p.nominal))
     ]
     return ends + [
         f"{name}: its strength may follow {law.argument} even more than the fit allows"
