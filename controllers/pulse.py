@@ -24,6 +24,7 @@ from controllers.base import DIGEST, OneValve, compiled, composed
 from controllers.pulse_table import PulseTable, duration, nominal_table, pulse_tables
 from controllers.registration import Range, Registration
 from controllers.valve_learner import FILTER_TIME, LEAST_HEAD, VALVE, begin, observe
+from epv_env.observation import READINGS, read
 from epv_env.plant.plantfile import Plant
 from epv_env.task import LimitingTask
 
@@ -92,22 +93,22 @@ def nominal_knowledge(plant: Plant) -> Knowledge:
 
 
 @composed
-def follow(v, observation, c, period):
-    """Learn from one valve's observation (entries,), and plan. c: a Knowledge."""
+def follow(v, r, observation, c, period):
+    """Learn from one valve's readings, and plan. c: a Knowledge."""
     if v.begun == 0:
         begin(v, c.informed)
     total = 0.0
     for entry in observation:
         total += entry
     if math.isfinite(total):  # of what is not finite nothing is learnt
-        observe(v, c.table, int(v.plant), observation, period, c.filter_time, c.informed)
+        observe(v, c.table, int(v.plant), r, period, c.filter_time, c.informed)
     plan(v, c.table, int(v.plant), c.plan, period)
 
 
 @composed
-def decide(v, observation, c, period):
+def decide(v, r, observation, c, period):
     """One valve's decision (controllers.base.OneValve)."""
-    follow(v, observation, c, period)
+    follow(v, r, observation, c, period)
     return v.advised
 
 
@@ -116,8 +117,10 @@ def _loop(digest: str) -> Any:
     def decide_all(memory, observations, c, period, actions):
         if digest == "":
             return
+        readings = np.zeros(1, READINGS)[0]
         for i in range(len(memory)):
-            actions[i] = decide(memory[i], observations[i], c, period)
+            read(readings, observations[i])
+            actions[i] = decide(memory[i], readings, observations[i], c, period)
 
     return decide_all
 
