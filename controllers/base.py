@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from epv_env import observation
 from epv_env.common.compilation import announce_compilation
+from epv_env.observation import READINGS, read
 from epv_env.plant.primitives import source_digest
 from epv_env.task import LimitingTask
 
@@ -53,6 +54,22 @@ class Privileged(Controller, Protocol):
         ...
 
 
+def over_batch(decide: Callable[..., Any]) -> Any:
+    """A compiled function of one valve, `OneValve.decide`, over a batch: `OneValve.decide_all`."""
+    digest = DIGEST
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def decide_all(memory, observations, constants, period, actions):
+        if digest == "":
+            return
+        readings = np.zeros(1, READINGS)[0]
+        for i in range(len(memory)):
+            read(readings, observations[i])
+            actions[i] = decide(memory[i], readings, observations[i], constants, period)
+
+    return decide_all
+
+
 class OneValve:
     """A controller of one valve, over a batch of n.
 
@@ -64,8 +81,7 @@ class OneValve:
 
     decide: ClassVar[Any]
     decide_all: ClassVar[Any]
-    """`decide` over a batch: (memory, observations, constants, period, actions). Each file has its own
-    loop: numba keeps none on disk that is handed the function to call."""
+    """`over_batch` of it: (memory, observations, constants, period, actions)."""
     record: np.dtype
     """Of a valve's memory."""
     constants: Any

@@ -1,14 +1,13 @@
 """Two-point control with hysteresis, with or without extrapolation of the measured pressure."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from controllers.base import DIGEST, OneValve, compiled, composed
+from controllers.base import OneValve, compiled, over_batch
 from controllers.registration import Choice, Range, Registration
-from epv_env.observation import P2_LAGS, READINGS, read
+from epv_env.observation import P2_LAGS
 
 
 class Thresholds(NamedTuple):
@@ -32,24 +31,11 @@ def two_points(on, r, thresholds, period):
     return 1.0 if r.error + thresholds.shut_lookahead * slope > thresholds.shut_above else 0.0
 
 
-@composed
+@compiled
 def decide(m, r, observation, p, period):
     """One valve's decision (controllers.base.OneValve)."""
     m.off = 1.0 - two_points(1.0 - m.off, r, p, period)
     return 1.0 - m.off
-
-
-def _loop(digest: str) -> Any:
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, p, period, actions):
-        if digest == "":
-            return
-        readings = np.zeros(1, READINGS)[0]
-        for i in range(len(memory)):
-            read(readings, observations[i])
-            actions[i] = decide(memory[i], readings, observations[i], p, period)
-
-    return decide_all
 
 
 @dataclass(kw_only=True)
@@ -74,7 +60,7 @@ class Hysteresis(OneValve):
     """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
-    decide, decide_all = staticmethod(decide), _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), over_batch(decide)
     record = np.dtype((np.record, [("off", np.float64)]))
 
     def __post_init__(self) -> None:

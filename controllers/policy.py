@@ -8,13 +8,12 @@ so the check of the sensors comes first (controllers/sensor_check.py).
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, composed
+from controllers.base import OneValve, compiled, over_batch
 from controllers.hysteresis import Hysteresis, Thresholds
 from controllers.knowledge import INPUTS, describe, forced
 from controllers.network import Network, Weights, forward
@@ -23,7 +22,6 @@ from controllers.pulse import Knowledge, nominal_knowledge
 from controllers.sensor_check import SENSES, Ends, checked, ends_of, overruled
 from controllers.tuned import tuned
 from controllers.valve_learner import VALVE
-from epv_env.observation import READINGS, read
 from epv_env.plant.plantfile import Plant, load_plant
 
 TRAINED = Path(__file__).parent / "trained"
@@ -41,7 +39,7 @@ class Parts(NamedTuple):
     weights: Weights
 
 
-@composed
+@compiled
 def decide(m, r, observation, c, period):
     """One valve's decision (controllers.base.OneValve). c: Parts."""
     checked(m.senses, r, observation, c.ends, c.fallback, period)
@@ -50,19 +48,6 @@ def decide(m, r, observation, c, period):
     forward(c.weights, m.inputs, m.signals)
     off = force < 0 or (force == 0 and m.signals[0, 0] >= m.signals[0, 1])
     return 1.0 if force > 1 else overruled(m.senses, 0.0 if off else 1.0)
-
-
-def _loop(digest: str) -> Any:
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, c, period, actions):
-        if digest == "":
-            return
-        readings = np.zeros(1, READINGS)[0]
-        for i in range(len(memory)):
-            read(readings, observations[i])
-            actions[i] = decide(memory[i], readings, observations[i], c, period)
-
-    return decide_all
 
 
 @dataclass(kw_only=True)
@@ -76,7 +61,7 @@ class Policy(OneValve):
     """[s]"""
     name: str = "PPO"
     environment: str = "EPValve-v0"
-    decide, decide_all = staticmethod(decide), _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), over_batch(decide)
 
     def __post_init__(self) -> None:
         fallback = tuned(FALLBACK, self.plant)

@@ -16,15 +16,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, compiled, composed
+from controllers.base import OneValve, compiled, composed, over_batch
 from controllers.pulse_table import PulseTable, duration, nominal_table, pulse_tables
 from controllers.registration import Range, Registration
 from controllers.valve_learner import FILTER_TIME, LEAST_HEAD, VALVE, begin, observe
-from epv_env.observation import READINGS, read
 from epv_env.plant.plantfile import Plant
 from epv_env.task import LimitingTask
 
@@ -105,30 +103,17 @@ def follow(v, r, observation, c, period):
     plan(v, c.table, int(v.plant), c.plan, period)
 
 
-@composed
+@compiled
 def decide(v, r, observation, c, period):
     """One valve's decision (controllers.base.OneValve)."""
     follow(v, r, observation, c, period)
     return v.advised
 
 
-def _loop(digest: str) -> Any:
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, c, period, actions):
-        if digest == "":
-            return
-        readings = np.zeros(1, READINGS)[0]
-        for i in range(len(memory)):
-            read(readings, observations[i])
-            actions[i] = decide(memory[i], readings, observations[i], c, period)
-
-    return decide_all
-
-
 class _Pulse(OneValve):
     """Acts as `plan` advises."""
 
-    decide, decide_all = staticmethod(decide), _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), over_batch(decide)
     record = VALVE
 
 
