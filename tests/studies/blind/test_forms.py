@@ -1,5 +1,7 @@
 """The bench's forms: the plant's own without deviation or effect, others with them."""
 
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -19,7 +21,7 @@ from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
 
-PLANT = COMPILED_RIGHT_HAND_SIDES[True]
+PLANT: Any = COMPILED_RIGHT_HAND_SIDES[True]
 CURRENT = State._fields.index("I")
 
 
