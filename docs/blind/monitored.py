@@ -26,7 +26,8 @@ from identification.valve_gap.monitor import monitor_log
 
 FOLDER = Path(__file__).parent
 COLUMNS = ("case", "from the start", "since", "earliest", "latest", "mended", "what", "P", "seconds")
-"""Drives by number from 1. What: the most probable cause of a change; a verdict in brackets names none."""
+"""Drives by number from 1. What: the most probable cause of a change, with the verdict where that names
+none. P: its probability."""
 
 
 def answer(log: Path, out: Path) -> dict[str, Any]:

@@ -122,15 +122,15 @@ def parameters(nominal: Parameters) -> list[Cause]:
 def effect_size(size: Size, nominal: Parameters) -> FreeParameter:
     """A size of an effect as the diagnosis fits it."""
     row = table()[size.symbol]
-    low, high = row.domain or (0.0, 0.0)
+    (low, high), value = row.domain or (0.0, 0.0), nominal[size.symbol]
     return FreeParameter(
         symbol=size.symbol,
         meaning=row.meaning,
         unit=row.unit,
         low=max(low, low if size.least_fitted is None else size.least_fitted),
         high=high,
-        nominal=nominal[size.symbol],
-        trials=size.trials,
+        nominal=value,
+        trials=tuple(trial / 2.0 if trial == value else trial for trial in size.trials),  # it must act
         scale=abs(size.trials[0]) if size.trials else 1.0,
         sd=size.spread or math.inf,
     )

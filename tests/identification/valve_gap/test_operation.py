@@ -107,7 +107,7 @@ TRUE = {"first": (1, 3), "second": (2, 4), "third": (0, 4)}
 """Drives in which causes act, of four."""
 
 
-def linearised(sizes: dict[str, float]) -> tuple[Any, ...]:
+def linearised(sizes: dict[str, float]) -> tuple[Any, Any, Any]:
     """Runs in which causes of these sizes act, signatures of all causes, and each run's drive."""
     rng, drives = np.random.default_rng(0), np.repeat(np.arange(4), 3)
     signatures = [
