@@ -44,17 +44,17 @@ def test_cause_onset_and_repair_are_told(tmp_path, capsys):
     eddy = {"eddy_current": {"G_eddy": 0.004}}
     folder, repaired = tmp_path / "log", tmp_path / "repaired"
     controller = tuned("extrapolating hysteresis")
-    write_log(folder, controller, PLANT, range(2), effects=eddy, onset=1, **DRIVES)
+    write_log(folder, controller, PLANT, range(3), effects=eddy, onset=1, **DRIVES)
     write_log(repaired, controller, PLANT, [3], **DRIVES)
-    shutil.copy(repaired / "drive-1.csv", folder / "drive-3.csv")
+    shutil.copy(repaired / "drive-1.csv", folder / "drive-4.csv")
     manifest = json.loads((folder / "log.json").read_text())
-    manifest["drives"].append({"file": "drive-3.csv"})
+    manifest["drives"].append({"file": "drive-4.csv"})
     (folder / "log.json").write_text(json.dumps(manifest))
-    assert main(["monitor", str(folder), "--out", str(tmp_path / "out")]) == 0
+    assert main(["monitor", str(folder), "--learn", "4", "--out", str(tmp_path / "out")]) == 0
     told = capsys.readouterr().out
     assert "changed since drive-2.csv (> 99 %): eddy current" in told
-    assert "mended since drive-3.csv" in told
+    assert "mended since drive-4.csv" in told
     content = json.loads((tmp_path / "out" / "learnt" / "gap.json").read_text())
     assert content["causes"][0]["effects"] == ["eddy_current"]
     assert content["onset"] == content["causes"][0]["onset"]["eddy_current"]
-    assert (content["onset"]["drive"], content["onset"]["mended"]) == ("drive-2.csv", "drive-3.csv")
+    assert (content["onset"]["drive"], content["onset"]["mended"]) == ("drive-2.csv", "drive-4.csv")
