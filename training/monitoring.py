@@ -37,8 +37,6 @@ REPEATED = 6
 """Valves with each effect."""
 MEDIUM = 1.5
 """Size of a medium effect, as a multiple of the catalogue's trial size."""
-LEAST_OFFSET = 0.01
-"""Variance of a valve's own offset at least, in variances of one opening [-]."""
 EXCESS = 1.5
 """Factor on the variance [-]: with 1, false alarms came about eight times as often as stated."""
 LEAST_SHIFT = 0.75
@@ -162,12 +160,11 @@ def _nominal_model(data: Openings) -> MonitorModel:
     covariance = EXCESS * _long_run(within, data.drive)
     between = np.cov(means.T) - covariance / count
     lower = np.linalg.inv(np.linalg.cholesky(covariance))
-    variances, axes = np.linalg.eigh(lower @ between @ lower.T)
+    _, axes = np.linalg.eigh(lower @ between @ lower.T)
     whiten = axes.T @ lower
     return MonitorModel(
         centre=centre, scale=scale, whiten=whiten, expected=whiten @ expected.T,
-        offset=np.maximum(variances, LEAST_OFFSET), effects=(), components=(),
-        shifts=np.empty((0, len(whiten), LINEAR)),
+        effects=(), components=(), shifts=np.empty((0, len(whiten), LINEAR)),
     )  # fmt: skip
 
 

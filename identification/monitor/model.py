@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from epv_env.common.files import JSONFileError, read_json, write_json
 from identification.monitor.features import CONDITIONS, FEATURES
 
-FORMAT = "epv-monitor/2"
-REMEDY = "make the monitor anew with `epv monitor`"
+FORMAT = "epv-monitor/3"
+REMEDY = "make the model anew with training.monitoring.monitor_model"
 SHIPPED = Path(__file__).with_name("monitor.json")
 """The model of a monitor for the report's valve; `python -m training.monitoring` makes it."""
 
@@ -22,7 +22,7 @@ UNKNOWN = "unknown"
 RETURN = "return"
 """Name of a change that takes back the latest one: a repair, a supply that is restored."""
 SMALLEST, LARGEST = 1e-9, 1e9
-"""Least scale and variance, and greatest magnitude, of a model's numbers: no simulation gives others."""
+"""Least scale, and greatest magnitude, of a model's numbers: no simulation gives others."""
 
 QUADRATIC = 5
 """Conditions from the first on, whose products count, too."""
@@ -45,8 +45,6 @@ class MonitorModel:
     """From features to whitened ones (features, features)."""
     expected: NDArray
     """Whitened features of the nominal plant by terms of the conditions (features, terms)."""
-    offset: NDArray
-    """Variance of a valve's own offset, in variances of one opening (features,)."""
     effects: tuple[str, ...]
     """Effect of each shift."""
     components: tuple[str, ...]
@@ -76,12 +74,12 @@ class MonitorModel:
         n, effects = len(FEATURES), len(self.effects)
         shapes = {
             "centre": (len(CONDITIONS),), "scale": (len(CONDITIONS),), "whiten": (n, n),
-            "expected": (n, TERMS), "offset": (n,), "shifts": (effects, n, LINEAR),
+            "expected": (n, TERMS), "shifts": (effects, n, LINEAR),
         }  # fmt: skip
         for name, shape in shapes.items():
             if getattr(self, name).shape != shape:
                 raise ValueError(f"{name} has the shape {getattr(self, name).shape}, not {shape}")
-            low, values = SMALLEST if name in ("scale", "offset") else -LARGEST, getattr(self, name)
+            low, values = SMALLEST if name == "scale" else -LARGEST, getattr(self, name)
             if wrong := values[~((values >= low) & (values <= LARGEST))].tolist():
                 raise ValueError(f"{name} holds {wrong[0]:g}, not a number from {low:g} to {LARGEST:g}")
         if len(self.components) != effects:
@@ -96,7 +94,6 @@ class _File(msgspec.Struct):
     scale: list[float]
     whiten: list[list[float]]
     expected: list[list[float]]
-    offset: list[float]
     effects: list[str]
     components: list[str]
     shifts: list[list[list[float]]]

@@ -1,9 +1,10 @@
 """A monitor beside any controller: the probability that the valve has changed, when, and what.
 
 It reads what a control unit reads. Every opening of the valve gives a few features. Their departure from
-what the identified plant shows, less the valve's own offset, is tested against the effects of the
-catalogue by a Shiryaev-Roberts statistic (docs/how-to/monitor-a-valve.md). A change that is settled
-becomes the reference, from which the next one, or the return, is told. Memory is bounded.
+what the model's plant shows, less the valve's own offset, is tested against the effects of the catalogue
+by a Shiryaev-Roberts statistic (docs/how-to/monitor-a-valve.md). The first openings give the offset,
+whatever the valve; a change that is settled becomes the reference, from which the next one, or the
+return, is told. Memory is bounded.
 """
 
 from collections import deque
@@ -20,8 +21,6 @@ CLIPPED = 4.0
 """Standard deviations beyond which a departure counts no more: consumption may change in an opening."""
 MEMORY = 400
 """Openings over which the valve's own offset is averaged: slow wear is followed."""
-BEFORE_START = 1.0
-"""Operation before the monitor starts in which a change may have happened [h]."""
 UNKNOWN_SHARE, UNKNOWN_SHIFT = 0.2, 4.0
 """Prior probability of an unknown change [-], and its size in each whitened feature [deviations]."""
 RETURN_SHARE = 0.2
@@ -29,10 +28,11 @@ RETURN_SHARE = 0.2
 CONFIRMED = 2
 """Successive openings with odds beyond the threshold that make an alarm: one alone may lack a row."""
 SETTLING = 12
-"""Openings for which an alarm must last until its change is settled: its cause needs them."""
+"""Openings from which a valve is learnt at the start, and for which an alarm must last until its change
+is settled: its cause needs them."""
 RELEARNT = 0.5 * np.pi / SETTLING
-"""Variance of the median of the openings of a settled alarm, in variances of one opening: the new
-reference, which an opening with a jump of consumption does not move."""
+"""Variance of the median of these openings, in variances of one: the reference, which an opening with a
+jump of consumption does not move."""
 CHANGES = 100
 """Settled changes that are remembered."""
 LEAST = 1e-300
@@ -46,7 +46,7 @@ class Change:
     """A change of the valve, as the monitor saw it when it was settled, or sees it now."""
 
     onset: float
-    """When it began [s]; 0: before the start."""
+    """When it began [s]."""
     probability: float
     """That something has changed [-]."""
     causes: dict[str, float]
@@ -78,36 +78,33 @@ class Monitor:
         self.history: deque[tuple[float, float]] = deque(maxlen=10_000)
         self.settled: deque[Change] = deque(maxlen=CHANGES)
         self._reader, self._periods, self.restarts = OpeningReader(), 0, 0
-        width = len(model.offset)
+        width = len(model.whiten)
         alone = np.zeros((2 * width, width, LINEAR))
         alone[:, :, 0] = UNKNOWN_SHIFT * np.concatenate([np.eye(width), -np.eye(width)])
-        shifts = np.concatenate([share * model.shifts for share in STRENGTHS] + [alone])
+        self._shifts = np.concatenate([share * model.shifts for share in STRENGTHS] + [alone])
         unknown = (UNKNOWN,) * len(alone)
-        # Every shift twice: it came before the start, where the offset hides it, or it comes later.
-        self._shifts = np.concatenate([shifts, shifts])
-        self._names = [*(*model.effects * len(STRENGTHS), *unknown) * 2, RETURN]
-        self._parts = [*(*model.components * len(STRENGTHS), *unknown) * 2, RETURN]
+        self._names = [*model.effects * len(STRENGTHS), *unknown, RETURN]
+        self._parts = [*model.components * len(STRENGTHS), *unknown, RETURN]
         self._weights = _weights(self._names)
-        self._later = np.repeat([0.0, 1.0, 0.0], [len(shifts), len(shifts), 1])
         self.restart()
 
     def restart(self) -> None:
-        """Believe that nothing has changed, and learn the valve's offset anew."""
-        self._later[-1] = 0.0  # nothing to return from
-        self._back = np.zeros((len(self.model.offset), LINEAR))
+        """Learn the valve anew from its next openings."""
+        self._learning = True
+        self._possible = np.array([name != RETURN for name in self._names])  # nothing to return from
+        self._back = np.zeros((len(self.model.whiten), LINEAR))
         self._reference = self._back.copy()
         self._recent: deque[tuple[NDArray, NDArray]] = deque(maxlen=SETTLING)
         self._before = np.zeros(len(self._back))
-        self._refer(self._before, self.model.offset, BEFORE_START)
+        self._refer(self._before)
 
-    def _refer(self, mean: NDArray, variance: NDArray, before: float) -> None:
-        """Learn the state from here on. before: time in which an earlier change may be hidden [h]."""
-        self._mean, self._variance = mean.copy(), variance.copy()
+    def _refer(self, mean: NDArray) -> None:
+        """Watch for changes from this state on, which SETTLING openings have on average."""
+        self._mean, self._variance = mean.copy(), np.full(len(mean), RELEARNT)
         self._learnt = np.zeros((len(self._names), len(mean)))  # of each shift, by the mean
         # logarithm of the Shiryaev-Roberts statistic of each shift [h]
-        earlier = (self._later == 0.0) & (np.array(self._names) != RETURN)
-        self._log = np.log(np.maximum(before * earlier, LEAST))
-        self._since = np.full(len(self._later), self.time if self.settled else 0.0)
+        self._log = np.full(len(self._names), np.log(LEAST))
+        self._since = np.full(len(self._names), self.time)
         self._last, self._alarms = self.time, 0
 
     def pause(self) -> None:
@@ -136,7 +133,7 @@ class Monitor:
 
     @property
     def onset(self) -> float:
-        """When it changed, if it did [s]; 0: before the start."""
+        """When it changed, if it did [s]."""
         return float(self._shares() @ self._since)
 
     @property
@@ -180,11 +177,15 @@ class Monitor:
         departure = model.whiten @ z - model.expected @ x
         if not np.all(np.isfinite(departure)):
             return
+        self._recent.append((departure, linear))
+        if self._learning:
+            self._learn()
+            return
         found = departure - self._reference @ linear - self._mean
-        back = self._later[-1] * (self._before - self._back @ linear - self._mean)
+        back = self._possible[-1] * (self._before - self._back @ linear - self._mean)
         shift = np.vstack([self._shifts @ linear - self._learnt[:-1], back])
         far = [np.minimum(each**2, limit**2) for each in (found, found - shift)]
-        hours = self._later * (self.time - self._last) / 3600.0
+        hours = self._possible * (self.time - self._last) / 3600.0
         prior = np.logaddexp(self._log, np.log(np.maximum(hours, LEAST)))
         begun = hours * np.exp(-prior)
         self._since += begun * (self.time - self._since)
@@ -200,10 +201,15 @@ class Monitor:
             self.restarts += 1
             self.restart()
         self.history.append((self.time, self.log_odds))
-        self._recent.append((departure, linear))
         self._alarms = self._alarms + 1 if self.log_odds > 0.0 else 0
         if self._alarms == SETTLING:
             self._settle()
+
+    def _learn(self) -> None:
+        """The first openings become the reference."""
+        if len(self._recent) == SETTLING:
+            self._learning = False
+            self._refer(np.median([departure for departure, _ in self._recent], axis=0))
 
     def _settle(self) -> None:
         """The present state becomes the reference; the latest change can be taken back from now on."""
@@ -213,10 +219,9 @@ class Monitor:
         returned = likeliest == len(self._shifts)
         self._back = -self._back if returned else self._shifts[likeliest]
         self._reference = self._reference + self._back
-        self._later[-1] = 1.0
+        self._possible[-1] = True
         self._before = self._mean - shares @ self._learnt
-        mean = np.median([z - self._reference @ x for z, x in self._recent], axis=0)
-        self._refer(mean, np.full(len(mean), RELEARNT), 0.0)
+        self._refer(np.median([z - self._reference @ x for z, x in self._recent], axis=0))
 
     def _change(self) -> Change:
         return Change(self.onset, self.probability, self.causes(), self.components())
@@ -234,8 +239,8 @@ class Monitor:
 
 
 def _weights(names: list[str]) -> NDArray:
-    """Prior of each shift, which comes early or late: UNKNOWN_SHARE, RETURN_SHARE, the rest evenly."""
-    count = {name: names.count(name) / 2 for name in names} | {RETURN: 1}
+    """Prior of each shift: UNKNOWN_SHARE, RETURN_SHARE, the rest evenly."""
+    count = {name: names.count(name) for name in names}
     shares = {UNKNOWN: UNKNOWN_SHARE, RETURN: RETURN_SHARE}
     known = (1.0 - UNKNOWN_SHARE) / max(len(count) - len(shares), 1)
     return np.array([shares.get(name, known) / count[name] for name in names])

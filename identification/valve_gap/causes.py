@@ -71,7 +71,7 @@ def catalogue(
     nominal: parameters of the model. free: symbols that calibration fits. Raises ValueError for a name
     that no cause has.
     """
-    every = effects() + [c for c in parameters(nominal) if c.parameters[0].symbol not in free]
+    every = effects(nominal) + [c for c in parameters(nominal) if c.parameters[0].symbol not in free]
     unknown = set(without) - {cause.name for cause in every}
     if unknown:
         known = ", ".join(dict.fromkeys(cause.name for cause in every))
@@ -79,15 +79,18 @@ def catalogue(
     return tuple(cause for cause in every if cause.name not in without)
 
 
-def effects() -> list[Cause]:
-    """Causes that are effects of the catalogue, a variant each."""
+def effects(nominal: Parameters) -> list[Cause]:
+    """Causes that are effects of the catalogue, a variant each.
+
+    nominal: parameters of the model. One that has an effect already may have it weaker, or not at all.
+    """
     return [
         Cause(
             name=effect.name,
             words=WORDS.get(effect.name, ""),
             variant=variant,
             component=effect.component,
-            parameters=tuple(effect_size(size) for size in sizes),
+            parameters=tuple(effect_size(size, nominal) for size in sizes),
             run_parameters=tuple(
                 NuisanceParameter(symbol=size.symbol, sd=size.scatter, step=size.difference or 0.0)
                 for size in effect.sizes
@@ -116,17 +119,18 @@ def parameters(nominal: Parameters) -> list[Cause]:
     ]
 
 
-def effect_size(size: Size) -> FreeParameter:
+def effect_size(size: Size, nominal: Parameters) -> FreeParameter:
     """A size of an effect as the diagnosis fits it."""
     row = table()[size.symbol]
-    low, high = row.domain or (0.0, 0.0)
+    (low, high), value = row.domain or (0.0, 0.0), nominal[size.symbol]
     return FreeParameter(
         symbol=size.symbol,
         meaning=row.meaning,
         unit=row.unit,
         low=max(low, low if size.least_fitted is None else size.least_fitted),
         high=high,
-        trials=size.trials,
+        nominal=value,
+        trials=tuple(trial / 2.0 if trial == value else trial for trial in size.trials),  # it must act
         scale=abs(size.trials[0]) if size.trials else 1.0,
         sd=size.spread or math.inf,
     )

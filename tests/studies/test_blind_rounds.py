@@ -6,7 +6,7 @@ import shutil
 
 import pytest
 
-from docs.blind import collect
+from docs.blind import collect, monitored
 from docs.blind.collect import ARCHIVE, FOLDER, main, packed, table, unpacked
 from docs.blind.opened import counts, judged, labels_of, reliability
 
@@ -22,7 +22,7 @@ def test_the_archive_is_the_one_that_the_page_names_and_gives_the_tables():
     assert hashlib.sha256(archive).hexdigest() in (FOLDER / "README.md").read_text(encoding="utf-8")
     files = unpacked(archive)
     rounds = {name.split("/")[0] for name in files}
-    assert rounds == {path.stem for path in FOLDER.glob("*.csv")}
+    assert rounds == {each.stem for each in FOLDER.glob("*.csv") if "-monitor" not in each.stem}
     for name in rounds:
         assert (FOLDER / f"{name}.csv").read_text(encoding="utf-8") == table(files, name)
 
@@ -85,3 +85,19 @@ def test_opened_cases_are_counted_by_kind_and_by_stated_probability():
 def test_a_round_without_labels_is_refused(tmp_path):
     with pytest.raises(ValueError, match=r"has no labels\.json: give the folder of a round"):
         labels_of(tmp_path)
+
+
+def test_a_monitor_is_right_where_the_interval_holds_the_drive_and_the_cause_is_named():
+    labels = {
+        "late": {"effects": ["seat_leak"], "since_drive": 3, "until_drive": 4},
+        "whole": {"effects": ["eddy_current"], "since_drive": 1},
+        "none": {"effects": [], "since_drive": None},
+    }
+    blank = dict.fromkeys(monitored.COLUMNS, "")
+    right = {"since": 2, "earliest": 2, "latest": 3, "mended": 4, "what": "seat_leak"}
+    answers = {
+        "late": blank | right, "whole": blank | {"from the start": "eddy_current"}, "none": blank,
+    }  # fmt: skip
+    assert [row[1] for row in monitored.counts(answers, labels)] == ["0 of 2", *["1 of 1"] * 4]
+    wrong = {"late": blank | right | {"latest": 2, "mended": "", "what": "seat_leak (unknown)"}}
+    assert [row[1] for row in monitored.counts(wrong, labels)] == ["0 of 0", *["0 of 1"] * 3, "0 of 0"]

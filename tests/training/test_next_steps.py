@@ -32,7 +32,7 @@ ENDED = {
     **{f"gap campaign --out {verdict} --plant valve.json": name for verdict, name in VERDICTS.items()},
     "import a.csv --out campaign --plant valve.json": "run",
     "log --out log": "monitor",
-    "monitor log --out monitor": "gap",
+    "monitor log --out monitor": "monitor",
     "run campaign --out results": "gap",
     "run campaign --out results --stage quality --seed 3": "run",
     "sim-to-real --out loop": "compare",

@@ -103,6 +103,32 @@ def spans_of_causes(
     return found
 
 
+def gain_by_change(
+    runs: Sequence[LinearisedRun],
+    signatures: Sequence[CauseSignature],
+    drives: NDArray,
+    count: int,
+    readings: int,
+    lasting: Collection[str] = (),
+    known: bool = False,
+) -> float:
+    """By how much causes that act in some drives better what acts in all [tolerated misfits].
+
+    By linear prediction: one of them beside the best that acts in all. 1 may be chance. known: what acts
+    in all drives counts as a change, too. Further arguments: of `spans_of_causes`.
+    """
+    spans = [span for span in combinations(range(count + 1), 2) if span != (0, count)]
+    acting = np.array([in_span(drives, *span) for span in spans])
+    everywhere = np.ones(len(drives), dtype=bool)
+    none, whole = least_squares_by_span(runs, signatures, np.array([~everywhere, everywhere])).T
+    best = int(np.argmin(whole))
+    beside = least_squares_by_span(runs, signatures, acting, (signatures[best], everywhere))
+    beside[[signature.cause.label in lasting for signature in signatures]] = np.inf
+    before = float(none[best] if known else whole[best])
+    misfit = (before / min(float(np.min(beside)), before) - 1.0) * readings / 2.0
+    return misfit / tolerated_misfit(readings)
+
+
 def in_span(drives: NDArray, first: int, end: int) -> NDArray:
     """Whether drives by number lie in a span, boolean, shaped as `drives`."""
     return (drives >= first) & (drives < end)

@@ -17,14 +17,20 @@ from epv_env.common.units import GRAM
 from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
 from epv_env.signals import OptionError
-from identification.__main__ import main
 from identification.gap.fit.variable_projection import LinearisedRun
-from identification.gap.search.onset import Onset, Span, in_span, likeliest_span, spans_of_causes
+from identification.gap.search.onset import (
+    Onset,
+    Span,
+    gain_by_change,
+    in_span,
+    likeliest_span,
+    spans_of_causes,
+)
 from identification.recordings.log_files import Drive, Log, read_log
 from identification.recordings.openings import drive_of, openings, pauses, start_of
 from identification.recordings.recording import CampaignError, Recording
 from identification.replay.model_inputs import model_inputs
-from identification.valve_gap.operation import LoggedValve, steady_openings
+from identification.valve_gap.logged_valve import LoggedValve, steady_openings
 from training.drives import write_log
 
 PLANT = Plant.calibrated()
@@ -97,22 +103,25 @@ def test_a_cause_acts_from_its_drive_on(symbol, size, healthy):
         assert np.any(both != without)
 
 
-def test_each_cause_has_its_drives_also_beside_another_one():
-    """The first acts in drives 1 and 2 and is mended; the second, smaller one begins in drive 2."""
+TRUE = {"first": (1, 3), "second": (2, 4), "third": (0, 4)}
+"""Drives in which causes act, of four."""
+
+
+def linearised(sizes: dict[str, float]) -> tuple[Any, Any, Any]:
+    """Runs in which causes of these sizes act, signatures of all causes, and each run's drive."""
     rng, drives = np.random.default_rng(0), np.repeat(np.arange(4), 3)
-    true, sizes = {"first": (1, 3), "second": (2, 4), "third": (0, 4)}, {"first": 3.0, "second": 1.0}
-    signatures: Any = [
+    signatures = [
         SimpleNamespace(
             cause=SimpleNamespace(label=label), changes=list(rng.normal(size=(12, 40))), shares=(-9, 9)
         )
-        for label in true
+        for label in TRUE
     ]
     runs = []
     for r, drive_number in enumerate(drives):
         residual = rng.normal(size=40)
         for signature in signatures:
             label = signature.cause.label
-            size = sizes.get(label, 0.0) * in_span(np.array(drive_number), *true[label])
+            size = sizes.get(label, 0.0) * in_span(np.array(drive_number), *TRUE[label])
             residual += size * signature.changes[r]
         none = np.zeros((40, 0))
         runs.append(
@@ -122,13 +131,29 @@ def test_each_cause_has_its_drives_also_beside_another_one():
                 shared_slopes=none,
             )
         )  # fmt: skip
-    spans = spans_of_causes(runs, signatures, drives, 4, 480)
+    return runs, signatures, drives
+
+
+def test_each_cause_has_its_drives_also_beside_another_one():
+    """The first acts in drives 1 and 2 and is mended; the second, smaller one begins in drive 2."""
+    sizes = {"first": 3.0, "second": 1.0}
+    spans = spans_of_causes(*linearised(sizes), 4, 480)
     for label in sizes:
-        assert (spans[label].first, spans[label].end) == true[label]
+        assert (spans[label].first, spans[label].end) == TRUE[label]
         assert spans[label].probability > 0.9
     assert spans["first"].onset(["a", "b", "c", "d"]) == Onset(
         "b", spans["first"].probability, "d", "b", "b"
     )
+
+
+@pytest.mark.parametrize(
+    ("sizes", "changes", "differs"),
+    [({}, False, False), ({"third": 1.0}, False, True), ({"third": 1.0, "second": 1.0}, True, True)],
+)
+def test_what_acts_in_all_drives_is_a_change_of_a_known_valve_alone(sizes, changes, differs):
+    log = (*linearised(sizes), 4, 480)
+    assert (gain_by_change(*log) > 1.0) == changes
+    assert (gain_by_change(*log, known=True) > 1.0) == differs
 
 
 def test_of_spans_that_no_opening_tells_apart_the_shortest_is_taken():
@@ -172,28 +197,6 @@ def test_the_reading_on_which_the_controller_opens_does_not_count(healthy):
         doubted = np.zeros(len(run.time), dtype=bool)
         doubted[opens] = True
         assert np.all(run.trusted[0] == (~doubted if run.name in steady else False))
-
-
-def test_cause_and_onset_are_found(tmp_path):
-    eddy = {"eddy_current": {"G_eddy": 0.004}}
-    folder = tmp_path / "log"
-    write_log(
-        folder,
-        tuned("extrapolating hysteresis"),
-        PLANT,
-        range(3),
-        duration=20.0,
-        scenario="steps",
-        effects=eddy,
-        onset=1,
-    )
-    assert main(["gap", str(folder), "--logs", "--out", str(tmp_path / "out")]) == 0
-    content = json.loads((tmp_path / "out" / "gap.json").read_text())
-    assert content["causes"][0]["effects"] == ["eddy_current"]
-    assert content["onset"] == content["causes"][0]["onset"]["eddy_current"]
-    assert content["onset"]["drive"] == "drive-2.csv"
-    assert content["onset"]["mended"] is None
-    assert content["onset"]["probability"] > 0.9
 
 
 def test_a_log_is_refused_in_a_sentence(healthy, tmp_path):

@@ -28,8 +28,9 @@ NAMES = ("test1", "test4", "low_supply", "validation", "rest")
 
 
 def test_every_effect_of_the_plant_is_a_cause_with_a_component():
-    assert {cause.name for cause in effects()} == set(CATALOGUE)
-    for cause in effects() + parameters(Parameters.calibrated()):
+    nominal = Parameters.calibrated()
+    assert {cause.name for cause in effects(nominal)} == set(CATALOGUE)
+    for cause in effects(nominal) + parameters(nominal):
         assert cause.sizes, cause.label
         for parameter in cause.parameters:
             assert parameter.low < parameter.high
