@@ -28,10 +28,12 @@ def read_mdf(path: Path) -> tuple[str, list[SourceChannel]]:
     with path.open("rb") as stream:
         if stream.read(3) not in MDF_SIGNATURES:  # asammdf would print a traceback beside its error
             raise ValueError("it does not begin as MDF does")
-    with asammdf.MDF(path) as mdf:
-        numbers = sum(group.channel_group.cycles_nr * len(group.channels) for group in mdf.groups)
-        check_unpacked(path, numbers * NUMBER)
-        return f"MDF {mdf.version}", [_mdf_channel(mdf, s) for s in mdf.iter_channels(skip_master=True)]
+        stream.seek(0)
+        with asammdf.MDF(stream) as mdf:  # of a damaged path it would print a traceback, too
+            numbers = sum(group.channel_group.cycles_nr * len(group.channels) for group in mdf.groups)
+            check_unpacked(path, numbers * NUMBER)
+            channels = [_mdf_channel(mdf, signal) for signal in mdf.iter_channels(skip_master=True)]
+            return f"MDF {mdf.version}", channels
 
 
 NUMBER = 8

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -97,8 +98,8 @@ def run_batches(
 
     def metrics(part: Batch) -> EpisodeMetrics:
         if journal is None or part.name in finished:
-            return _metrics(finished[part.name])
-        return journal.read(part.name, _metrics)
+            return kept_metrics(finished[part.name], part.episodes)
+        return journal.read(part.name, partial(kept_metrics, episodes=part.episodes))
 
     return [EpisodeMetrics.joined([metrics(part) for part in each]) for each in parts]
 
@@ -163,5 +164,10 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}
 
 
-def _metrics(figures: Mapping[str, list[Any]]) -> EpisodeMetrics:
-    return EpisodeMetrics(**{name: np.array(values) for name, values in figures.items()})
+def kept_metrics(figures: Mapping[str, list[Any]], episodes: int) -> EpisodeMetrics:
+    """Figures in a journal. Raises ValueError unless each is a number for each of so many episodes."""
+    arrays = {name: np.array(values) for name, values in figures.items()}
+    for array in arrays.values():
+        if array.shape != (episodes,) or array.dtype.kind not in "bif" or np.isnan(array).any():
+            raise ValueError("not a number for each episode")
+    return EpisodeMetrics(**arrays)

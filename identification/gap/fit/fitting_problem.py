@@ -186,18 +186,25 @@ class FitCache:
         return estimates
 
     def _estimate(self, entry: dict[str, Any]) -> Estimate:
+        """An estimate as the journal has it. Raises ValueError and others for what is none."""
         causes = {cause.label: cause for cause in self.plant.causes}
-        runs = len(self.plant.runs)
-        return Estimate(
-            hypothesis=Hypothesis(
-                causes=tuple(causes[label] for label in entry["causes"]),
-                laws=tuple(
-                    Law(cause=causes[label], argument=argument, low=low, high=high)
-                    for label, argument, low, high in entry["laws"]
-                ),
+        hypothesis = Hypothesis(
+            causes=tuple(causes[label] for label in entry["causes"]),
+            laws=tuple(
+                Law(cause=causes[label], argument=argument, low=low, high=high)
+                for label, argument, low, high in entry["laws"]
             ),
-            vector=np.array(entry["vector"]),
-            run_values=np.array(entry["local"]).reshape(runs, -1),
+        )
+        shape = len(self.plant.parameters) + len(hypothesis.parameters)
+        vector, runs = np.array(entry["vector"], dtype=float), len(self.plant.runs)
+        run_values = np.array(entry["local"], dtype=float).reshape(runs, len(hypothesis.run_parameters))
+        numbers = np.r_[vector, run_values.ravel()]
+        if vector.shape != (shape,) or not np.all(np.isfinite(numbers)) or not entry["chi_square"] >= 0:
+            raise ValueError("not a number for each parameter")
+        return Estimate(
+            hypothesis=hypothesis,
+            vector=vector,
+            run_values=run_values,
             chi_square=entry["chi_square"],
             converged=entry["converged"],
             given_up=entry["given_up"],
