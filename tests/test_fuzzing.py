@@ -170,6 +170,7 @@ def refusal(use: Use, folder: Path) -> str:
     return "still good"
 
 
+@pytest.mark.filterwarnings("error::pytest.PytestUnraisableExceptionWarning")  # a traceback
 @pytest.mark.parametrize(
     ("first", "count"), [(0, 8), pytest.param(8, 72, marks=pytest.mark.slow)], ids=["few", "many"]
 )
