@@ -14,7 +14,7 @@ from controllers.knowledge import READINGS
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import load_search, load_tunings, save_tunings
-from epv_env.common.files import Journal
+from epv_env.common.files import Journal, read_bytes
 from epv_env.common.results_folder import CONFIG, check_options, write_options
 from epv_env.operation_log import DECIMALS
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject, save_plant
@@ -223,7 +223,7 @@ def _state() -> tuple[Any, bytes]:
 
 def _restore(folder: Path) -> None:
     env, _ = _state()
-    restore_state(env, SavedState.from_bytes((folder / "state").read_bytes()))
+    restore_state(env, SavedState.from_bytes(read_bytes(folder / "state")))
     observation, reward, *_ = env.step(1)
     assert np.all(np.isfinite([*observation, reward]))
 
@@ -261,7 +261,7 @@ FORMATS: dict[str, tuple[Use, Use]] = {
     "recording.csv": (
         _table,
         lambda folder: read_columns(
-            "recording.csv", (folder / "recording.csv").read_bytes(), REQUIRED_COLUMNS
+            "recording.csv", read_bytes(folder / "recording.csv"), REQUIRED_COLUMNS
         ),
     ),
     "log.json": (_log, _openings),
