@@ -13,7 +13,7 @@ MAKEFLAGS += --no-print-directory
 # The environments come without bytecode: each of the many processes would compile what it imports anew.
 export PYTHONDONTWRITEBYTECODE :=
 .DEFAULT_GOAL := help
-.PHONY: help venv train test test-slow test-oldest bench docs lint check format wheel clean
+.PHONY: help venv train test test-slow test-oldest bench studies docs lint check format wheel clean
 
 help: ## list the targets
 	@sed -n 's/^\([a-z][a-z%-]*\):.*## /\1	/p' Makefile | while IFS='	' read -r name text; do \
@@ -64,6 +64,9 @@ test-oldest: $(OLDEST)/.installed ## run the plant and environment tests on the 
 
 bench: $(VENV)/.installed ## measure speed and memory beside peers (ten minutes)
 	$(PY) -m tests.benchmarks $(ARGS)
+
+studies: $(VENV)/.installed ## measure again what the code has left behind, cheapest first; it resumes
+	$(PY) -m docs.studies.freshness $(ARGS)
 
 study-%: $(VENV)/.installed ## run a study of docs/studies, such as study-comparison
 	$(PY) -m docs.studies.$*.study $(ARGS)

@@ -1,10 +1,16 @@
-"""The check of the sensors in front of a policy: what becomes of lost readings and of a p3 that freezes.
+"""The check of the sensors in front of a policy: what becomes of readings that a valve cannot show.
 
-A reading is lost if it is not finite or lies beyond the ends of its sensor. For HELD periods the last
-good reading takes its place. The coil decides where p3 goes: on, the control chamber fills up to p1;
-off, it empties to the ambient pressure. A p3 far from that end that stands still contradicts the coil.
-After either a hysteresis that does not read p3 takes over until the reset. Without p2 and a target it is
-blind, and the coil stays on.
+A reading is lost if it is not finite, lies beyond the ends of its sensor, or contradicts the valve's own
+equations after the last good one:
+
+- p1 is a reservoir's: it does not jump.
+- The coil decides where p3 goes: on, the control chamber fills up to p1; off, it empties to the ambient
+  pressure. So p3 never goes the other way, and never lies above p1.
+
+For HELD periods the last good reading takes a lost one's place. More losses than good readings make up
+for, or a p3 that stands still far from the end that it goes to, end the trust until the reset: a
+hysteresis takes over that reads neither p1 nor p3. Without p2 and a target it is blind, and the coil
+stays on.
 
 The compiled functions work on one valve with plain arithmetic, so that they can be translated to C.
 """
@@ -22,14 +28,26 @@ from epv_env.plant.channels import CURRENT, P1, P2, P3, Sensor
 
 HELD = 3
 """Control periods for which a reading is held: fewer than the four after which p3 stands still."""
+FORGIVEN = 1 / 8
+"""Lost readings that a good one makes up for [1]: a sensor with random values does not recover."""
 WAIT = 25e-3
-"""Time for which the coil has been as it is before p3 must move [s]: the armature's delay, the latency
-of the command, and the four periods over which the change is observed."""
+"""Time for which the coil has been as it is before p3 must obey it [s]: the armature's delay, the
+latency of the command, and the four periods over which the change is observed."""
+JUMP = 0.5
+"""Most that p1 changes between two readings [bar]: a refill within a second changes it by 0.08."""
+FASTEST = 300.0
+"""Fastest change of p3 [bar/s]: a chamber fills with 180 bar/s and empties with 150 bar/s at most."""
+AGAINST = 0.3
+"""Most that p3 seems to move against the coil in a period [bar]: seven standard deviations of two
+readings' difference with four times Table 3's noise."""
 STILL = 0.02
 """Change over four periods below which p3 stands still [bar]: twice the standard deviation that Table
 3's noise gives it. A chamber that fills or empties moves many times as much."""
-MARGIN = 0.5
-"""Distance of p3 from the end that it goes to, within which it may stand still [bar]."""
+MARGIN = 0.4
+"""Distance of p3 from the end that it goes to, within which it may stand still; most that it may lie
+above p1 [bar]. Table 1 allows each sensor 0.256, in squares 0.36 together."""
+FAR = 3.0
+"""Distance from which one period shows whether p3 moves [bar]: it then moves by 0.15 bar or more."""
 AMBIENT = 1.0
 """Pressure that the chamber empties to [bar]."""
 MOST_PERIODS = 65535.0
@@ -42,8 +60,8 @@ _P1, _P2, _P3, _I, _TARGET = range(COUNT)
 _ENTRIES = np.array([INDEX[name] for name in ("p1", "p2_error", "p3", "I", "target")])
 _P2_CHANGES, _P3_CHANGES = INDEX["p2_change_1"], INDEX["p3_change_1"]
 _P2_LAGS, _P3_LAGS = np.array(P2_LAGS), np.array(P3_LAGS)
-_ERROR, _COIL, _SINCE, _P3_MOVED = (
-    INDEX[name] for name in ("p2_error", "action", "since_switching", "p3_change_4")
+_ERROR, _COIL, _SINCE, _P3_STEP, _P3_MOVED = (
+    INDEX[name] for name in ("p2_error", "action", "since_switching", "p3_change_1", "p3_change_4")
 )
 
 START = np.array([10.0, 8.0, 8.0, 0.3, 8.0])
@@ -57,7 +75,7 @@ SENSES = np.dtype(
             ("last", np.float64, (COUNT,)),  # the last good ones
             ("p2", np.float64, (HISTORY,)),  # held readings, the newest first [bar]
             ("p3", np.float64, (HISTORY,)),
-            ("lost", np.float64),  # latest periods in a row in each of which a reading was lost
+            ("lost", np.float64),  # periods in which a reading was lost, less what good ones made up for
             ("whole", np.float64),  # latest periods in a row without a loss
             ("periods", np.float64),  # since the reset
             ("begun", np.float64),  # 1: all readings were good once, or HELD is over
@@ -92,7 +110,30 @@ def is_good(value, ends, i):
 
 
 @compiled
-def hold(s, ends):
+def settled(s, observation, period):
+    """Whether p3 must obey the coil: it has been as it is for WAIT."""
+    # What happened before the first observation is not known: the coil may have switched just then.
+    known = min(in_unit(observation, _SINCE), s.periods * period)
+    return known > WAIT - period / 2  # whole periods
+
+
+@compiled
+def is_possible(s, i, observation, period):
+    """Whether a reading can follow the last good one; p1 has been held before p3 is asked about."""
+    change = s.now[i] - s.last[i]
+    if i == _P1:
+        return abs(change) <= JUMP
+    if i != _P3:
+        return True
+    fastest = FASTEST * period * (1 + s.lost)  # the last good one may be as old
+    if s.now[_P3] > s.now[_P1] + MARGIN or abs(change) > fastest:
+        return False
+    against = change if observation[_COIL] < 0 else -change
+    return against <= AGAINST or not settled(s, observation, period)
+
+
+@compiled
+def hold(s, observation, ends, period):
     """Put the last good readings in the place of lost ones, in `now`."""
     if s.periods == 0:
         for i in range(COUNT):
@@ -105,12 +146,14 @@ def hold(s, ends):
         good = is_good(s.now[i], ends, i)
         if i == _P2 and s.blind > 0:
             good = False
+        if good and s.begun > 0:
+            good = is_possible(s, i, observation, period)
         if good:
             s.last[i] = s.now[i]
         else:
             lost = 1.0
         s.now[i] = s.last[i]
-    s.lost = min(s.lost + 1, MOST_PERIODS) if lost > 0 else 0.0
+    s.lost = min(s.lost + 1, MOST_PERIODS) if lost > 0 else max(s.lost - FORGIVEN, 0.0)
     s.whole = 0.0 if lost > 0 else min(s.whole + 1, MOST_PERIODS)
 
 
@@ -122,7 +165,7 @@ def remember(s):
         s.p2[older] = s.p2[older - 1] if s.begun > 0 else s.now[_P2]
         s.p3[older] = s.p3[older - 1] if s.begun > 0 else s.now[_P3]
     s.p2[0], s.p3[0] = s.now[_P2], s.now[_P3]
-    if s.lost == 0 or s.lost > HELD:
+    if s.whole > 0 or s.lost > HELD:
         s.begun = 1.0
 
 
@@ -151,10 +194,10 @@ def implausible(s, observation, period):
     """Whether p3 stands still where the coil should move it."""
     p3 = s.now[_P3]
     remains = s.now[_P1] - p3 if observation[_COIL] > 0 else p3 - AMBIENT
-    # What happened before the first observation is not known: the coil may have switched just then.
-    known = min(in_unit(observation, _SINCE), s.periods * period)
-    still = abs(in_unit(observation, _P3_MOVED)) < STILL
-    return still and remains > MARGIN and known > WAIT - period / 2  # whole periods
+    still = abs(in_unit(observation, _P3_MOVED)) < STILL and remains > MARGIN
+    # A lost reading is held, which is no sign that p3 stands still.
+    still_far = abs(in_unit(observation, _P3_STEP)) < STILL and remains > FAR and s.whole > 0
+    return (still or still_far) and settled(s, observation, period)
 
 
 @compiled
@@ -177,7 +220,7 @@ def read(s, observation):
 def checked(s, observation, ends, thresholds, period):
     """Take in an observation (entries,), and put what is held into it."""
     read(s, observation)
-    hold(s, ends)
+    hold(s, observation, ends, period)
     remember(s)
     if s.whole < HISTORY:  # a change over past readings reaches back to a loss
         show(s, observation)
@@ -189,4 +232,4 @@ def overruled(s, action):
     """What the coil does, 0 (off) or 1 (on), if the policy wants `action`."""
     if s.begun == 0 or (s.failed > 0 and s.blind > 0):
         return 1.0  # there is nothing to decide by
-    return s.fallback if s.failed > 0 else action
+    return s.fallback if s.failed > 0 or s.whole == 0 else action

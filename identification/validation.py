@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from statsmodels.stats.diagnostic import acorr_ljungbox
-from statsmodels.tsa.stattools import acf
+from scipy.stats import chi2
 
 from epv_env.plant.parameters import Parameters
 from identification.calibration.calibrate import EXPLAINED
 from identification.calibration.problem import CalibrationProblem
+from identification.noise import autocovariance
 from identification.recordings.recording import OUTPUTS, CampaignError
 from identification.replay.replay import (
     Response,
@@ -55,11 +55,18 @@ class WhitenessTest:
 
 
 def assess_whiteness(residual: NDArray, lags: int) -> WhitenessTest:
-    """Of a signal (samples,), in any unit, that changes; lags: the greatest [samples]."""
-    table = acorr_ljungbox(residual, lags=sorted({min(FIRST_LAGS, lags), lags}))
+    """Of a signal (samples,), in any unit, that changes; lags: the greatest [samples].
+
+    Ljung and Box, On a measure of lack of fit in time series models, Biometrika 65 (1978).
+    """
+    n = len(residual)
+    covariance = autocovariance([residual - np.mean(residual)])[: lags + 1]
+    correlation = covariance / covariance[0]
+    statistic = (n + 2) / n * np.cumsum(np.arange(n - 1, n - 1 - lags, -1) * correlation[1:] ** 2)
+    tested = np.array([min(FIRST_LAGS, lags), lags])
     return WhitenessTest(
-        autocorrelation=np.asarray(acf(residual, nlags=lags, fft=True)),
-        probability=float(min(1.0, 2 * np.min(table["lb_pvalue"]))),
+        autocorrelation=correlation,
+        probability=float(min(1.0, 2 * np.min(chi2.sf(statistic[tested - 1], tested)))),
     )
 
 

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("stable_baselines3")
-pytest.importorskip("statsmodels")
+pytest.importorskip("jinja2")
 
 from epv_env.common.commands import commands, main
 from epv_env.common.files import _checksum

@@ -2,20 +2,22 @@
 
 A generated part of a page stands between two markers:
 
-    <!-- generated: NAME -->
+    <!-- generated: NAME, study STUDY, code CODE -->
     ... whatever the study last wrote ...
     <!-- end: NAME -->
+
+`docs.studies.freshness` says what the code is. Parts that hold no figure of a study have neither.
 """
 
 import argparse
+import re
 import shutil
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from docs.studies.freshness import ROOT, code_of
 from epv_env.common.files import write_text
 
-ROOT = Path(__file__).parents[2]
-"""The repository's root."""
 PAGE = "README.md"
 """Name of a study's page."""
 
@@ -41,7 +43,7 @@ def study_parser(description: str, folder: Path) -> argparse.ArgumentParser:
 def study_options(
     parser: argparse.ArgumentParser, arguments: Sequence[str] | None = None
 ) -> argparse.Namespace:
-    """The options, and `work`: the folder for what is kept between runs, such as a journal.
+    """The options, and `work`: the folder for what runs of the same code share, such as a journal.
 
     Another folder than the study's gets a copy of the page: a trial run changes nothing published.
     """
@@ -49,7 +51,7 @@ def study_options(
     runs, name = ROOT / "runs", options.folder.name
     if options.out is None:
         options.out = runs / f"{name}-quick" if options.quick else options.folder
-    options.work = options.out if options.quick else runs / name
+    options.work = options.out if options.quick else runs / name / code_of(name)
     options.out.mkdir(parents=True, exist_ok=True)
     page = options.folder / PAGE
     if options.out.resolve() != options.folder.resolve() and page.exists():
@@ -70,17 +72,11 @@ def fill(page: Path, parts: Mapping[str, str]) -> None:
     """
     text = page.read_text(encoding="utf-8")
     for name, part in parts.items():
-        before, begin, rest = text.partition(_begin(name))
-        _, end, after = rest.partition(_end(name))
-        if not end:
-            raise ValueError(f"{page}: put {_begin(name)} and {_end(name)} where this part belongs")
-        text = f"{before}{begin}\n{part.strip()}\n{end}{after}"
+        end = f"<!-- end: {name} -->"
+        begin = rf"<!-- generated: {re.escape(name)}(?:, study (\w+), code \w+)? -->"
+        if not (found := re.search(rf"{begin}\n.*?{end}", text, re.DOTALL)):
+            raise ValueError(f"{page}: put <!-- generated: {name} --> and {end} where this part belongs")
+        code = f", study {found[1]}, code {code_of(found[1])}" if found[1] else ""
+        filled = f"<!-- generated: {name}{code} -->\n{part.strip()}\n{end}"
+        text = text[: found.start()] + filled + text[found.end() :]
     write_text(page, text)
-
-
-def _begin(name: str) -> str:
-    return f"<!-- generated: {name} -->"
-
-
-def _end(name: str) -> str:
-    return f"<!-- end: {name} -->"

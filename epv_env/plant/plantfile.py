@@ -1,7 +1,7 @@
 """The plant file: parameters, effects and region as versioned JSON (docs/reference/files.md)."""
 
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from importlib.metadata import version
 from os import PathLike
 from pathlib import Path
@@ -65,6 +65,19 @@ class Plant:
             parameters=parameters,
             region=Region.named("confidence", parameters),
             provenance={"source": "SCL-001/2003, Tables 5-7, 12 and 14"},
+        )
+
+    def refitted(
+        self, region: Region, name: str, *, diagnosis: Mixture | None = None, **provenance: object
+    ) -> "Plant":
+        """The valve with a region's centre for its parameters; provenance: what says where from."""
+        return replace(
+            self,
+            parameters=region.centre,
+            region=region,
+            diagnosis=diagnosis,
+            name=name,
+            provenance={"software": f"{DISTRIBUTION} {version(DISTRIBUTION)}", **provenance},
         )
 
 

@@ -59,7 +59,7 @@ class Region:
             and bool(np.all(np.isfinite(covariance)))
             and np.allclose(covariance, covariance.T, rtol=1e-9, atol=0.0)
             and bool(np.all(np.diag(covariance) >= 0))
-            and bool(np.all(np.linalg.eigvalsh(_correlation(covariance)) >= -1e-9))
+            and bool(np.all(np.linalg.eigvalsh(correlation(covariance)) >= -1e-9))
         )
         if not proper:
             raise ParameterError(
@@ -167,7 +167,7 @@ class Region:
         """
         if self.covariance is None:
             return ball  # without coordinates, since there are no joint symbols
-        variances, axes = np.linalg.eigh(_correlation(self.covariance))
+        variances, axes = np.linalg.eigh(correlation(self.covariance))
         offset = (ball * np.sqrt(np.maximum(variances, 0))) @ axes.T
         offset *= np.sqrt(self.chi_square * np.diag(self.covariance))
         low, high = np.transpose([self.centre.domain(s) for s in self.symbols])
@@ -225,7 +225,7 @@ class Mixture:
         return self.alternatives[min(int(np.searchsorted(self._ends, rng.random())), last)].region
 
 
-def _correlation(covariance: NDArray) -> NDArray:
+def correlation(covariance: NDArray) -> NDArray:
     """The correlation matrix: free of units, whose magnitudes differ by more than a float's digits."""
     deviation = np.sqrt(np.diag(covariance))
     deviation = np.where(deviation > 0, deviation, 1.0)

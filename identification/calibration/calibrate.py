@@ -12,6 +12,7 @@ import numpy as np
 
 from epv_env.common.files import Journal
 from epv_env.plant.parameters import Parameters, table
+from epv_env.plant.region import correlation
 from identification.calibration.problem import CalibrationProblem
 from identification.calibration.search import (
     METHODS,
@@ -161,12 +162,12 @@ def inseparable_symbols(problem: CalibrationProblem, fit: SearchResult) -> tuple
     Collinearity is strong from 30 on (Belsley 1980); the parameters are those with weight in the
     flattest direction.
     """
-    jacobian = np.vstack(problem.least_squares().linearised(fit.z)[1])
-    normalised = jacobian / np.maximum(np.linalg.norm(jacobian, axis=0), np.finfo(float).tiny)
-    condition = float(np.linalg.cond(normalised))
+    information = np.linalg.inv(correlation(problem.evaluated(fit.z).covariance))
+    values, vectors = np.linalg.eigh(correlation(information))
+    condition = float(np.sqrt(values[-1] / max(values[0], np.finfo(float).tiny)))
     if condition < 30.0:
         return [], condition
-    direction = np.abs(np.linalg.svd(normalised, full_matrices=False)[2][-1])
+    direction = np.abs(vectors[:, 0])
     involved = [s for s, w in zip(problem.vector.symbols, direction, strict=True) if w > 0.3]
     return involved, condition
 

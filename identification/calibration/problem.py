@@ -1,25 +1,28 @@
-"""What a calibration is about: recordings, the parameters that may move, and the model's misfit.
+"""What a calibration is about: recordings, the parameters that may move, and the plant that is fitted.
 
-Two weightings of the misfit: by the measured noise (least squares), and that of the report's total
-error, whose square (eqs 19-21) is a weighted sum of squares too. What a recording does not tell of
-itself exactly - its circuit pressure at the start, the zero of the p3 and I sensors on that day - is a
-nuisance. The outputs are as good as linear in these few numbers, which are solved for at every candidate
-(variable projection, Golub & Pereyra 1973), so the optimiser sees the parameters alone.
+What a recording does not tell of itself exactly - its circuit pressure at the start, the zero of the p3
+and I sensors on that day - is a nuisance, which the fits solve for at every candidate.
 """
 
-from collections.abc import Mapping, Sequence
+import math
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.free_parameters import FREE_PARAMETERS, Freedom, check_free
-from epv_env.plant.parameters import Parameters
+from epv_env.plant.parameters import Parameters, table
+from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate
+from identification.gap.fit.fitting_problem import FittingProblem, Hypothesis
+from identification.gap.fit.gauss_newton import nuisance_slopes
+from identification.gap.plant import FreeParameter
 from identification.quality.assessment import SensorOffset, assess_recording, sensor_offsets
 from identification.recordings.noise import campaign_noise, campaign_steps
-from identification.recordings.recording import OUTPUTS, Campaign, CampaignError, Recording
-from identification.replay.model_inputs import model_inputs, without_offsets
-from identification.replay.replay import P2_SHIFT, Replay, measured_outputs
+from identification.recordings.recording import Campaign, CampaignError, Recording
+from identification.replay.model_inputs import without_offsets
+from identification.replay.valve import ReplayedValve
 
 
 @dataclass(frozen=True)
@@ -50,127 +53,41 @@ class ParameterVector:
     def _freedom(self, symbol: str) -> Freedom:
         return self.freedoms.get(symbol, Freedom())
 
-    def prior(self, z: NDArray) -> tuple[NDArray, NDArray]:
-        """What is known before of a scaled vector z (k,): residuals (p,) and derivatives (p, k).
-
-        One for each of the p symbols with a mean: the departure from it in standard deviations.
-        """
-        known = [(i, self._freedom(s)) for i, s in enumerate(self.symbols)]
-        rows = [(i, f.mean, f.sd) for i, f in known if f.mean is not None and f.sd is not None]
-        residuals = np.array([(mean - self.scale[i] * z[i]) / sd for i, mean, sd in rows])
-        slopes = np.zeros((len(rows), len(z)))
-        for row, (i, _, sd) in enumerate(rows):
-            slopes[row, i] = -self.scale[i] / sd
-        return residuals, slopes
-
     def known(self) -> dict[str, tuple[float | None, float | None]]:
         """Mean and standard deviation of what is known before, by symbol [SI], ready for JSON."""
         freedoms = {symbol: self._freedom(symbol) for symbol in self.symbols}
         return {s: (f.mean, f.sd) for s, f in freedoms.items() if f.mean is not None}
 
-    def values(self, z: NDArray) -> dict[str, NDArray]:
-        """Values by symbol [SI], each of shape (n,), for scaled vectors z (n, k)."""
-        return dict(zip(self.symbols, np.moveaxis(np.atleast_2d(z) * self.scale, 1, 0), strict=True))
+    def free_parameters(self) -> list[FreeParameter]:
+        """The symbols as the fits know them: from the reference, within the bounds."""
+        return [
+            FreeParameter(
+                symbol=symbol,
+                unit=table()[symbol].unit,
+                low=low,
+                high=high,
+                nominal=self.reference[symbol],
+                meaning=table()[symbol].meaning,
+                scale=self.reference[symbol],
+                mean=math.nan if known.mean is None else known.mean,
+                sd=known.sd or math.inf,
+            )
+            for symbol, (low, high) in zip(self.symbols, self.domains.tolist(), strict=True)
+            for known in [self._freedom(symbol)]
+        ]
+
+    def named(self, z: NDArray) -> dict[str, float]:
+        """Values by symbol [SI] for one scaled vector (k,), within the domains."""
+        inside = np.clip(z * self.scale, *self.domains.T)
+        return dict(zip(self.symbols, inside.tolist(), strict=True))
 
     def parameters(self, z: NDArray) -> Parameters:
         """The complete set [SI] for one scaled vector (k,), within the domains."""
-        inside = np.clip(z * self.scale, *self.domains.T)
-        return self.reference.replace(**dict(zip(self.symbols, inside.tolist(), strict=True)))
+        return self.reference.replace(**self.named(z))
 
     def scaled(self, parameters: Mapping[str, float]) -> NDArray:
         """The scaled vector (k,), without unit, of a set of parameters [SI]."""
         return np.array([parameters[symbol] for symbol in self.symbols]) / self.scale
-
-
-class WeightedResiduals:
-    """Weighted residuals of recordings for scaled parameter vectors."""
-
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        vector: ParameterVector,
-        weights: Sequence[NDArray],
-    ):
-        """Residuals of `recordings`; weights: per recording (3, samples) [1/SI]."""
-        self.vector = vector
-        self.weights = list(weights)
-        self.measured = [measured_outputs(recording) for recording in recordings]
-        drives = [model_inputs(recording, vector.reference) for recording in recordings]
-        self.replay = Replay(drives, vector.reference)
-
-    def error(self, z: NDArray) -> float:
-        """Root of the sum of squares for one scaled vector (k,), without unit.
-
-        Under `report_weights` the total error of equation 21, a fraction.
-        """
-        return float(np.linalg.norm(np.concatenate(self.residuals(z))))
-
-    def residuals(self, z: NDArray) -> list[NDArray]:
-        """Weighted measured - model without nuisances, per recording (3 samples,), without unit."""
-        return [residual for residual, _ in self._projected(z, np.zeros((0, len(z))))]
-
-    def linearised(self, z: NDArray) -> tuple[list[NDArray], list[NDArray]]:
-        """`residuals`, and their derivatives by z, per recording (3 samples, k), without unit.
-
-        A difference is taken away from the nearer end of a parameter's domain.
-        """
-        low, high = self.vector.bounds.T
-        step = 1e-4 * np.where(z > 0.5 * (low + high), -1.0, 1.0)
-        pairs = self._projected(z, np.diag(step))
-        return (
-            [residual for residual, _ in pairs],
-            [changes / step for _, changes in pairs],
-        )
-
-    def _projected(self, z: NDArray, steps: NDArray) -> list[tuple[NDArray, NDArray]]:
-        """Residual (3 samples,) and its changes (3 samples, m) by the steps (m, k), per recording."""
-        candidates = np.vstack([z, z, z + steps])
-        shift = np.zeros(len(candidates))
-        shift[1] = 1e3  # Pa, by which the influence of the start is measured
-        outputs = self.replay.outputs({**self.vector.values(candidates), P2_SHIFT: shift})
-        return [
-            _without_nuisances(model, measured, weights)
-            for model, measured, weights in zip(outputs, self.measured, self.weights, strict=True)
-        ]
-
-
-def _without_nuisances(model: NDArray, measured: NDArray, weights: NDArray) -> tuple[NDArray, NDArray]:
-    """Residual and changes without their share along the nuisances.
-
-    model: (3, samples, 2 + m): candidate, the same with p2 shifted at the start, and m steps.
-    """
-    weighted = (weights[:, :, None] * model).reshape(measured.size, -1)
-    # A candidate that cannot be integrated is far off.
-    residual = np.nan_to_num((weights * measured).ravel() - weighted[:, 0], nan=1e3)
-    nuisances = np.zeros((*measured.shape, 3))
-    nuisances[..., 0] = (weighted[:, 1] - weighted[:, 0]).reshape(measured.shape)
-    for column, output in ((1, "p3"), (2, "I")):
-        nuisances[OUTPUTS.index(output), :, column] = weights[OUTPUTS.index(output)]
-    basis = np.linalg.qr(np.nan_to_num(nuisances.reshape(measured.size, 3)))[0]
-    both = np.column_stack([residual, np.nan_to_num(weighted[:, :1] - weighted[:, 2:])])
-    both -= basis @ (basis.T @ both)
-    return both[:, 0], both[:, 1:]
-
-
-def noise_weights(recordings: Sequence[Recording], noise: Mapping[str, float]) -> list[NDArray]:
-    """1 / standard deviation per output and sample, (3, samples) [1/SI]; noise: by output [SI]."""
-    each = np.array([1.0 / noise[output] for output in OUTPUTS])
-    return [np.repeat(each[:, None], len(recording), axis=1) for recording in recordings]
-
-
-def report_weights(recordings: Sequence[Recording]) -> list[NDArray]:
-    """Weights, (3, samples) [1/SI], under which the sum of squares is the squared total error.
-
-    Equations 19 to 21 of the report: root of each sample's share of the time, over the output's time
-    mean and the root of the number of recordings.
-    """
-    weights = []
-    for recording in recordings:
-        share = np.full(len(recording), 1.0 / (len(recording) - 1))
-        share[[0, -1]] *= 0.5
-        means = measured_outputs(recording) @ share
-        weights.append(np.sqrt(share) / means[:, None] / np.sqrt(len(recordings)))
-    return weights
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -188,15 +105,28 @@ class CalibrationProblem:
     vector: ParameterVector
     """Its reference is where the calibration starts."""
 
-    def least_squares(self) -> WeightedResiduals:
-        """The calibration recordings' misfit in units of their noise."""
-        return WeightedResiduals(
-            self.calibration, self.vector, noise_weights(self.calibration, self.noise)
+    @cached_property
+    def plant(self) -> ReplayedValve:
+        """The calibration recordings and the model, as the fits know them."""
+        return ReplayedValve(
+            self.calibration,
+            self.vector.reference,
+            self.vector.free_parameters(),
+            self.noise,
+            self.steps.get("p2", 0.0),
         )
 
-    def total_error(self) -> WeightedResiduals:
-        """The calibration recordings' misfit by the report's total error (eqs 19-21)."""
-        return WeightedResiduals(self.calibration, self.vector, report_weights(self.calibration))
+    def fitting(self, z: NDArray) -> FittingProblem:
+        """The least-squares problem with the nuisances' derivatives at a scaled vector (k,)."""
+        rough = FittingProblem(self.plant)
+        start = rough.start(Hypothesis(causes=()), self.vector.named(z))
+        return FittingProblem(self.plant, *nuisance_slopes(rough, [start], [np.zeros(0)]))
+
+    def evaluated(self, z: NDArray) -> EvaluatedHypothesis:
+        """A scaled vector (k,) with its residuals and its covariance."""
+        fitting = self.fitting(z)
+        start = fitting.start(Hypothesis(causes=()), self.vector.named(z))
+        return evaluate(fitting, [start])[0]
 
 
 def calibration_problem(

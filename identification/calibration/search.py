@@ -11,25 +11,32 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import OptimizeResult, least_squares, minimize
+from scipy.optimize import minimize
 from scipy.stats import qmc
 
 from epv_env.common.field_types import check_fields
 from epv_env.common.files import Journal
 from epv_env.common.results_folder import progress
-from identification.calibration.problem import CalibrationProblem, ParameterVector, WeightedResiduals
+from identification.calibration.problem import CalibrationProblem, ParameterVector
+from identification.gap.fit.evidence import predict
+from identification.gap.fit.fitting_problem import Hypothesis
+from identification.gap.fit.recalibration import recalibrate
+from identification.report_2003 import partial_error, relative_error, total_error
 
 METHODS = ("Nelder-Mead", "least squares")
 """Names of the search methods in result files."""
 
 PRECISION = 1e-6
-"""Relative change of the parameters at which a search has converged."""
+"""Relative change of the parameters at which a Nelder-Mead search has converged."""
+
+LEAST_SQUARES_PRECISION = 1e-4
+"""Precision of the least squares [1]: 0.3 of chi-square times it are a hundredth of a standard error."""
 
 MOST_EVALUATIONS = 2000
 """Evaluations of the total error; a Nelder-Mead search that needs more has not converged."""
 
-MOST_STEPS = 200
-"""Steps of a least-squares search; a search that needs more has not converged."""
+MOST_STEPS = 100
+"""Steps of each fit of a least-squares search; a search that needs more has not converged."""
 
 SAME_MINIMUM = 1e-3
 """Relative difference of the parameters within which two searches reach the same minimum."""
@@ -72,52 +79,78 @@ class SearchResult:
         return found
 
 
-def nelder_mead(misfit: WeightedResiduals, start: NDArray) -> SearchResult:
+class TotalError:
+    """The report's objective: the total error (eqs 19 to 21) of the calibration recordings.
+
+    Each recording has its own circuit pressure at the start and its own zeros of sensors.
+    """
+
+    def __init__(self, problem: CalibrationProblem):
+        """Take the nuisances' derivatives at the reference."""
+        self.vector = problem.vector
+        self._fitting = problem.fitting(self.vector.scaled(self.vector.reference))
+        self._noise = np.array([[channel.known_noise] for channel in problem.plant.channels])
+
+    def __call__(self, z: NDArray) -> float:
+        """Of a scaled vector (k,), a fraction."""
+        estimate = self._fitting.start(Hypothesis(causes=()), self.vector.named(z))
+        residuals = predict(self._fitting, estimate).residuals
+        partials = [
+            partial_error(
+                [
+                    relative_error(measured, measured - deviation, run.time)
+                    for measured, deviation in zip(run.measured, self._noise * own, strict=True)
+                ]
+            )
+            for run, own in zip(self._fitting.plant.runs, residuals, strict=True)
+        ]
+        return float(total_error(partials))
+
+
+def nelder_mead(problem: CalibrationProblem, start: NDArray) -> SearchResult:
     """Minimise the total error by the simplex search that the report used (section 6.2).
 
-    misfit: with the weights of the total error. start: scaled vector (k,), without unit.
+    start: scaled vector (k,), without unit.
     """
     options = {"xatol": PRECISION, "fatol": 1e-3 * PRECISION, "maxfev": MOST_EVALUATIONS}
     began = perf_counter()
     result = minimize(
-        misfit.error, start, method="Nelder-Mead", bounds=misfit.vector.bounds, options=options
+        TotalError(problem), start, method="Nelder-Mead", bounds=problem.vector.bounds, options=options
     )
-    return _fit("Nelder-Mead", start, result, float(result.fun), began)
-
-
-def weighted_least_squares(misfit: WeightedResiduals, start: NDArray) -> SearchResult:
-    """Minimise the sum of squares in units of the noise by a trust-region Gauss-Newton method.
-
-    What is known of the parameters before counts like readings do.
-
-    misfit: with the weights of the noise. start: scaled vector (k,), without unit.
-    """
-    began = perf_counter()
-    result = least_squares(
-        lambda z: np.concatenate([*misfit.residuals(z), misfit.vector.prior(z)[0]]),
-        start,
-        jac=lambda z: np.vstack([*misfit.linearised(z)[1], misfit.vector.prior(z)[1]]),  # type: ignore[arg-type]
-        bounds=misfit.vector.bounds.T,
-        xtol=PRECISION,
-        ftol=PRECISION,
-        max_nfev=MOST_STEPS,
-    )
-    rms = float(np.sqrt(np.mean(np.square(result.fun))))
-    return _fit("least squares", start, result, rms, began)
-
-
-def _fit(
-    method: str, start: NDArray, result: OptimizeResult, error: float, began: float
-) -> SearchResult:
     return SearchResult(
-        method=method,
+        method="Nelder-Mead",
         start=np.asarray(start, dtype=float),
         z=np.asarray(result.x, dtype=float),
-        error=error,
+        error=float(result.fun),
         evaluations=int(result.nfev),
         seconds=perf_counter() - began,
         converged=bool(result.success),
         message=str(result.message),
+    )
+
+
+def weighted_least_squares(problem: CalibrationProblem, start: NDArray) -> SearchResult:
+    """Minimise the sum of squares in units of the noise, as the diagnosis recalibrates.
+
+    What is known of the parameters before counts like readings do. start: scaled vector (k,), without
+    unit.
+    """
+    began = perf_counter()
+    fitting, estimate = recalibrate(
+        problem.plant,
+        start=problem.vector.named(start),
+        iterations=MOST_STEPS,
+        precision=LEAST_SQUARES_PRECISION,
+    )
+    return SearchResult(
+        method="least squares",
+        start=np.asarray(start, dtype=float),
+        z=estimate.vector,
+        error=float(np.sqrt(estimate.chi_square / fitting.readings)),
+        evaluations=estimate.steps,
+        seconds=perf_counter() - began,
+        converged=estimate.converged,
+        message="converged" if estimate.converged else f"stopped after {MOST_STEPS} steps",
     )
 
 
@@ -142,14 +175,13 @@ def search_from_all_starts(
 
     starts: scaled vectors (starts, k), without unit. Returns the searches by method.
     """
-    misfits = {"Nelder-Mead": problem.total_error(), "least squares": problem.least_squares()}
     searches = {"Nelder-Mead": nelder_mead, "least squares": weighted_least_squares}
     searched: dict[str, list[SearchResult]] = {method: [] for method in METHODS}
     tasks = [(method, index) for index in range(len(starts)) for method in METHODS]
     for method, index in progress(tasks, what="calibrate: searches"):
         name = f"{method} {index}"
         if name not in journal:
-            journal.add(name, searches[method](misfits[method], starts[index]).as_json())
+            journal.add(name, searches[method](problem, starts[index]).as_json())
         read = partial(SearchResult.from_json, start=starts[index])
         searched[method].append(journal.read(name, read))
     return searched

@@ -11,7 +11,6 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import lfilter
 
 
 class PlantError(ValueError):
@@ -85,12 +84,15 @@ class FreeParameter:
     scale: float = math.nan
     """Usual size [SI], not 0; the optimiser works with value/scale. Left out: `usual_size`."""
     sd: float = math.inf
-    """Standard deviation of its Gaussian prior about `nominal` [SI]; infinity for none."""
+    """Standard deviation of its Gaussian prior [SI]; infinity for none."""
+    mean: float = math.nan
+    """Mean of that prior [SI]. Left out: `nominal`."""
 
     def __post_init__(self):
-        """Give a parameter without a scale its usual size, so that every scale is a number."""
-        if math.isnan(self.scale):
-            object.__setattr__(self, "scale", self.usual_size)
+        """Give a parameter without scale and mean its own, so that both are numbers."""
+        for name, own in (("scale", self.usual_size), ("mean", self.nominal)):
+            if math.isnan(getattr(self, name)):
+                object.__setattr__(self, name, own)
 
     @property
     def title(self) -> str:
@@ -292,39 +294,6 @@ def window_forcing(equation: StateEquation, samples: int, edges: NDArray) -> dic
     """
     window = np.searchsorted(edges, np.arange(samples), side="right")[:, None] - 1
     return {equation.name: equation.step * (window == np.arange(len(edges) - 1))}
-
-
-@dataclass(frozen=True, kw_only=True)
-class Ripple:
-    """A first-order process beside white noise, as an ARMA(1, 1) process (Granger and Morris 1976)."""
-
-    decay: float
-    """Autocorrelation of the process at two successive samples [1]."""
-    memory: float
-    """Coefficient of the former innovation in a reading [1]."""
-    noise: float
-    """Standard deviation of the innovations, what no former reading predicts [noise deviations]."""
-    sd: float
-    """Standard deviation of the process [noise deviations]."""
-
-    @classmethod
-    def of(cls, variance: float, white: float, decay: float) -> "Ripple":
-        """A process and white noise of these variances [noise variances]."""
-        sides = variance * (1.0 - decay**2) + white * (1.0 + decay**2)
-        product = white * decay
-        half = 0.5 * sides
-        innovations = half + math.sqrt(max(half**2 - product**2, 0.0))
-        return cls(decay=decay, memory=product / innovations, noise=math.sqrt(innovations),
-                   sd=math.sqrt(variance))  # fmt: skip
-
-    @property
-    def samples(self) -> float:
-        """Samples over which the process is correlated."""
-        return -1.0 / math.log(self.decay)
-
-    def whitened(self, series: NDArray) -> NDArray:
-        """Innovations of series (samples, ...) that were 0 before, in standard deviations of theirs."""
-        return np.asarray(lfilter([1.0, -self.decay], [1.0, -self.memory], series / self.noise, axis=0))
 
 
 def noise_weighted(plant: GreyBox, run: int, values: NDArray) -> NDArray:

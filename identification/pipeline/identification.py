@@ -16,7 +16,7 @@ from identification.calibration.calibrate import (
     symbols_on_bounds,
 )
 from identification.calibration.problem import CalibrationProblem, calibration_problem
-from identification.confidence.confidence import PRECISE, Confidence, assess_confidence
+from identification.confidence import PRECISE, Confidence, assess_confidence
 from identification.recordings.recording import Campaign
 from identification.report.page import ANSWERS, Section, Table, Verdict
 from identification.report_2003 import ACCEPTED_ERROR
@@ -34,7 +34,7 @@ class Identification:
     journal: Path
     """File of the finished searches."""
     seed: int = 0
-    """Of starts, draws and resampling."""
+    """Of the starts."""
     plant: Plant | None = None
     """The valve as its data sheet describes it; None: the report's, from Table 10."""
     starts: int = STARTS
@@ -69,7 +69,7 @@ class Identification:
     @cached_property
     def confidence(self) -> Confidence:
         """Intervals and joint region."""
-        return assess_confidence(self.calibration, seed=self.seed)
+        return assess_confidence(self.calibration)
 
     @cached_property
     def validation(self) -> Validation:

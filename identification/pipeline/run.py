@@ -1,8 +1,7 @@
 """The whole identification of one campaign: its stages, the plant file, the report."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from importlib.metadata import version
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -10,7 +9,7 @@ from epv_env.common.command_line import NextStep
 from epv_env.common.results_folder import progress
 from epv_env.plant.plantfile import Plant, save_plant
 from identification.calibration.calibrate import calibration_json, calibration_section
-from identification.confidence.confidence import confidence_json, confidence_section
+from identification.confidence import confidence_json, confidence_section
 from identification.pipeline.identification import ESTIMATOR, Identification, summary_section
 from identification.quality.assessment import assess_recording
 from identification.quality.section import as_json as quality_json
@@ -69,8 +68,7 @@ def quality(identification: Identification) -> Result:
 def sensitivity(identification: Identification) -> Result:
     """Section 5 on the campaign's own recordings."""
     problem = identification.problem
-    replay, symbols = problem.least_squares().replay, studied_symbols()
-    outputs = sensitivities_on_recordings(replay, symbols, problem.noise)
+    outputs = sensitivities_on_recordings(problem.plant.replay, studied_symbols(), problem.noise)
     return [sensitivity_section(outputs)], {"sensitivity": sensitivity_json(outputs)}
 
 
@@ -140,18 +138,13 @@ def run(identification: Identification, out: Path, next_step: NextStep) -> Plant
 
 def calibrated_plant(identification: Identification) -> Plant:
     """The calibrated plant with its joint region and where it comes from."""
-    return replace(
-        identification.plant or Plant.calibrated(),
-        parameters=identification.parameters,
-        region=identification.confidence.region,
-        diagnosis=None,
-        name=identification.campaign.name,
-        provenance={
-            "method": ESTIMATOR,
-            "software": f"epv-valve {version('epv-valve')}",
-            "seed": identification.seed,
-            "recordings_sha256": identification.hashes,
-            "calibrated_on": [r.name for r in identification.campaign.with_role("calibration")],
-            "warnings": identification.calibration.warnings,
-        },
+    valve = identification.plant or Plant.calibrated()
+    return valve.refitted(
+        identification.confidence.region,
+        identification.campaign.name,
+        method=ESTIMATOR,
+        seed=identification.seed,
+        recordings_sha256=identification.hashes,
+        calibrated_on=[r.name for r in identification.campaign.with_role("calibration")],
+        warnings=identification.calibration.warnings,
     )

@@ -10,8 +10,8 @@ import numpy as np
 from scipy.stats import norm
 
 from epv_env.plant.channels import SENSORS, Sensor
+from identification.noise import rounding_error
 from identification.quality.channel import ChannelAssessment, assess_channel
-from identification.readings_noise import rounding_error
 from identification.recordings.recording import CHANNELS, PRESSURES, UNITS, CampaignError, Recording
 
 LEAST_SAMPLES = 250

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from scipy import stats
 
 from epv_env.plant.channels import Sensor
-from identification.readings_noise import quantisation_step, rounding_error
+from identification.noise import quantisation_step, rounding_error
 from identification.recordings.plausibility import longest_run
 from identification.recordings.recording import UNITS
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from epv_env.plant.channels import CHANNEL
-from identification.readings_noise import quantisation_step, rounding_error, white_noise
+from identification.noise import quantisation_step, rounding_error, white_noise
 from identification.recordings.recording import (
     CHANNELS,
     PRESSURES,

@@ -14,6 +14,7 @@ from numpy.lib.stride_tricks import sliding_window_view
 from numpy.typing import NDArray
 
 from epv_env.common.units import BAR, GRAM
+from identification.noise import differences
 from identification.recordings.log_files import LONGEST, Drive, Log
 from identification.recordings.recording import CHANNELS, HOLD, Campaign, CampaignError, Recording
 
@@ -248,6 +249,6 @@ def _flow(p2: NDArray, period: float, storage: float) -> _Flow:
     centred = (np.arange(len(p2)) - 0.5 * (len(p2) - 1)) * period
     spread = np.sum(centred**2)
     slope = float(centred @ p2 / spread)
-    noise = float(np.sqrt(0.5 * np.var(np.diff(p2)))) + 1.0
+    noise = float(np.std(differences(p2, 1))) + 1.0
     rest = float(np.std(p2 - slope * centred))
     return _Flow(-storage * slope, storage * noise / float(np.sqrt(spread)), rest / noise)

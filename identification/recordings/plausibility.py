@@ -14,7 +14,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.readings_noise import quantisation_step, white_noise
+from identification.noise import quantisation_step, white_noise
 from identification.recordings.columns import CHANNEL_OF, Place
 from identification.recordings.recording import RULES, CampaignError, RecordingRules
 

@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import make_smoothing_spline
 from scipy.signal import savgol_filter
-from scipy.stats import chi2
 
-from identification.readings_noise import quantisation_step, rounding_error
+from identification.noise import differences, is_white, quantisation_step, rounding_error
 from identification.recordings.recording import HOLD, Recording
 
 BLOCK = 0.02
@@ -78,7 +77,7 @@ def smooth_voltage(recording: Recording) -> NDArray:
     borders = np.flatnonzero(np.diff(recording.energised)) + 1
     for stretch in np.split(U, borders):  # views: assigning to one changes U
         residual = stretch - np.mean(stretch)
-        if len(stretch) > 2 and _is_white(residual, recording.period):
+        if len(stretch) > 2 and is_white(residual, round(BLOCK / recording.period)):
             stretch[:] = np.mean(stretch)
     return U
 
@@ -95,7 +94,7 @@ def smooth_supply(recording: Recording, p: Mapping[str, float]) -> NDArray:
     # Readings that waver between two codes scatter by up to 1.7 rounding errors, fine steps far more.
     rounding = 1.4 * rounding_error(quantisation_step([recording.p1], fewest=1))
     coarse = np.sqrt(np.mean(residual**2)) <= rounding
-    if _is_white(residual, recording.period) or coarse or _is_ripple(residual):
+    if is_white(residual, round(BLOCK / recording.period)) or coarse or _is_ripple(residual):
         return fitted
     return _spline(recording)
 
@@ -122,22 +121,10 @@ def _air_balance(recording: Recording, p: Mapping[str, float]) -> NDArray:
     return basis @ np.linalg.lstsq(basis, recording.p1, rcond=None)[0]
 
 
-def _is_white(residual: NDArray, period: float) -> bool:
-    """Whether block means scatter no more than independent samples of the same spread allow.
-
-    The spread is read off differences between neighbours, which slow courses hardly enter.
-    """
-    length = min(max(2, round(BLOCK / period)), len(residual))
-    blocks = residual[: len(residual) // length * length].reshape(-1, length)
-    variance = 0.5 * np.mean(np.diff(residual) ** 2)
-    statistic = length * np.sum(np.mean(blocks, axis=1) ** 2)
-    return bool(statistic <= variance * chi2.isf(1e-4, len(blocks)))
-
-
 def _is_ripple(residual: NDArray) -> bool:
     """Whether a residual is a small ripple that is there at all times."""
     squares = [float(np.mean(part**2)) for part in np.array_split(residual, 4)]
-    white = 0.5 * float(np.mean(np.diff(residual) ** 2))
+    white = float(np.mean(differences(residual, 1) ** 2))
     small = sum(squares) / len(squares) <= SUPPLY_RIPPLE**2 * white
     return small and max(squares) <= STEADY * min(squares)
 

@@ -7,7 +7,6 @@ from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import Parameters, table
 from epv_env.plant.region import CALIBRATED_SYMBOLS
-from identification.calibration.problem import ParameterVector
 from identification.gap.plant import Cause, FreeParameter, NuisanceParameter
 
 PARAMETER_RANGE = 0.1
@@ -146,20 +145,3 @@ def parameter_size(symbol: str, nominal: Parameters) -> FreeParameter:
         trials=tuple(value * factor for factor in PARAMETER_TRIALS),
         scale=value,
     )
-
-
-def calibrated(vector: ParameterVector) -> list[FreeParameter]:
-    """The parameters that calibration fits, from the vector's reference, within its bounds."""
-    start = vector.reference
-    return [
-        FreeParameter(
-            symbol=symbol,
-            unit=table()[symbol].unit,
-            low=low,
-            high=high,
-            nominal=start[symbol],
-            meaning=table()[symbol].meaning,
-            scale=start[symbol],
-        )
-        for symbol, (low, high) in zip(vector.symbols, vector.domains.tolist(), strict=True)
-    ]

@@ -3,7 +3,6 @@
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from importlib.metadata import version
 from itertools import count
 from os import PathLike
 from pathlib import Path
@@ -140,19 +139,14 @@ def refitted_plant(found: Diagnosis, valve: Valve, name: str) -> Plant:
     region = region_of(found, best, valve)
     methods = {RECALIBRATED: "recalibration", NOMINAL: "none: recalibration makes it worse"}
     own = f" with {best.label}" if best.labels else f", {found.model_label}"
-    return replace(
-        valve.plant,
-        parameters=region.centre,
-        region=region,
+    return valve.plant.refitted(
+        region,
+        name + own,
         diagnosis=possible_plants(found, valve),
-        name=name + own,
-        provenance={
-            "method": methods.get(found.model_label, "joint refit with the cause of the gap"),
-            "software": f"epv-valve {version('epv-valve')}",
-            "verdict": found.conclusion.verdict,
-            "recordings_sha256": {r.name: r.sha256 for r in valve.recordings},
-            "warnings": found.warnings,
-        },
+        method=methods.get(found.model_label, "joint refit with the cause of the gap"),
+        verdict=found.conclusion.verdict,
+        recordings_sha256={r.name: r.sha256 for r in valve.recordings},
+        warnings=found.warnings,
     )
 
 

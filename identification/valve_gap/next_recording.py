@@ -14,9 +14,10 @@ from identification.gap.report.sentences import gap_text, listed, probability_te
 from identification.recordings.recording import CHANNELS, Recording
 from identification.replay.model_inputs import ModelInputs
 from identification.replay.replay import Replay
+from identification.replay.valve import as_run
 from identification.report.page import Table
 from identification.report_2003 import Case
-from identification.valve_gap.valve import Valve, as_run
+from identification.valve_gap.valve import Valve
 
 CASES = (
     Case(name="short pulses", openings=(0.02, 0.03, 0.04, 0.05, 0.06), duration=0.85, pause=0.1),

@@ -235,8 +235,9 @@ class LoggedValve(Valve):
         """`GreyBox.outputs`: per run an array (3, samples, n) of OUTPUTS [Pa, Pa, A]."""
         return super().outputs(self._where_acting(values), runs)
 
-    def _one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
-        return super()._one(self._where_acting(values), run)
+    def one(self, values: Mapping[str, NDArray], run: int) -> dict[str, float]:
+        """Plant parameters of the first candidate in a run [SI]."""
+        return super().one(self._where_acting(values), run)
 
     def _where_acting(self, values: Mapping[str, NDArray]) -> dict[str, NDArray]:
         """Values by symbol, those of causes nominal in drives without them, consumption as doubted."""

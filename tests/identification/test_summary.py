@@ -90,9 +90,8 @@ def test_only_the_value_at_an_end_of_its_domain_is_not_to_be_used():
 
 def test_a_wide_interval_is_doubted():
     made = identification()
-    wide = twin_confidence().covariance
     made.__dict__["confidence"] = replace(
-        twin_confidence(), covariance=replace(wide, inputs=wide.inputs + 1.0)
+        twin_confidence(), covariance=twin_confidence().covariance + 1.0
     )
     judged = judge_values(made)
     assert {worst(reasons) for reasons in judged.values()} == {"doubt"}

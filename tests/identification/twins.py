@@ -14,7 +14,7 @@ from identification.bench.programmes import DIAGNOSIS_SUITE, REPORT_SUITE
 from identification.bench.session import TrueSignals, measured_campaign, run_programme
 from identification.calibration.calibrate import Calibration, calibrate
 from identification.calibration.problem import CalibrationProblem, calibration_problem
-from identification.confidence.confidence import Confidence, assess_confidence
+from identification.confidence import Confidence, assess_confidence
 from identification.recordings.recording import CHANNELS, UNITS, Campaign, Recording
 
 TRUE = Parameters.calibrated()

@@ -106,12 +106,14 @@ static float between(float low, float high)
     return low + (high - low) * (float)((seed >> 33) / 2147483648.0);
 }
 
-/* Random readings in a row, each lost once in 50; what must hold after each decision. */
+/* Random readings in a row, p1 and p3 as a valve allows, each lost once in 50; what must hold after
+ * each decision. */
 int main(void)
 {
     static epv_policy_memory fresh;
     epv_policy_memory m = fresh, other;
     unsigned long k, above = 0, below = 0, lost = 0;
+    float p1 = 0, p3 = 0;
     for (k = 0; k < READINGS; k++) {
         epv_policy_readings now, held;
         float *const given[] = {&now.p1, &now.p2, &now.p3, &now.current, &now.target};
@@ -119,9 +121,10 @@ int main(void)
         int i, gone = 0, coil, error_lost;
         float error;
         if (k % 20 == 0)
-            m = fresh;
-        now.p1 = between(6, 16), now.p2 = between(1, 16), now.current = between(-1, 1);
-        now.p3 = between(0, 1) < 0.5f ? now.p1 - between(0, 0.5f) : between(1, 16);
+            m = fresh, p1 = between(6, 15.5f), p3 = p1;
+        p3 = fmaxf(fminf(p3 + between(-0.5f, 0.5f), p1), 1);
+        now.p1 = p1 + between(-0.2f, 0.2f), now.p2 = between(1, 16), now.current = between(-1, 1);
+        now.p3 = p3;
         now.target = now.p2 + between(-2, 2), now.coil = between(0, 1) < 0.5f;
         held = now;
         for (i = 0; i < 5; i++)
@@ -142,16 +145,19 @@ int main(void)
         if (!error_lost && error >= 0.5f && ++above && !coil)
             return 1;
         if (!gone && error <= -0.5f && now.coil && now.p1 - now.p2 > 1.001f &&
-            now.p1 - now.p3 < 0.499f && m.senses.failed == 0 && m.senses.begun > 0 &&
+            now.p1 - now.p3 < 0.499f && m.senses.failed == 0 && m.senses.whole > 0 &&
             !(m.valve.after_period_early > 0)) {
             below++;
             if (coil)
                 return 2;
         }
-        if (gone && other.senses.begun > 0 && m.senses.failed == 0) { /* as the last good ones */
+        if (gone && other.senses.begun > 0 && m.senses.failed == 0) { /* by the last good ones */
             lost++;
-            if (epv_policy_step(&other, &held) != coil)
+            epv_policy_step(&other, &held);
+            if (m.senses.fallback != other.senses.fallback)
                 return 3;
+            if (m.senses.now[1] - m.senses.now[4] < 0.499f && coil != (int)m.senses.fallback)
+                return 4;
         }
     }
     printf("%lu %lu %lu\\n", above, below, lost);

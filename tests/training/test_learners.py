@@ -17,15 +17,16 @@ import torch
 
 from controllers.knowledge import READINGS
 from controllers.policy import load_policy
-from controllers.policy_files import read_policy
+from controllers.policy_files import read_policy, write_policy
 from controllers.valve_learner import LEARNT
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import Options, next_step, sentence_of, verdict
-from training.learners import ppo
+from training.learners import ppo, selection
 from training.learners.actor import network_of
 from training.learners.environment import REWARD_SCALE, make_training_env, training_weights
 from training.learners.ppo import Task, checkpoints, make_model, read_rows, train
+from training.learners.selection import train_seeds
 
 pytestmark = pytest.mark.training
 TASK = Task(plant=Plant.calibrated())
@@ -121,6 +122,28 @@ def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatc
     policy = load_policy(whole)
     policy.reset(2)
     assert set(policy.act(np.zeros((2, READINGS)))) <= {0, 1}
+
+
+def test_seeds_are_ranked_by_violations_then_return_and_none_is_trained_twice(tmp_path, monkeypatch):
+    found = {1: (3, -90.0), 2: (2, -80.0), 3: (2, -70.0)}
+    monkeypatch.setattr(selection, "validated", lambda policy, *_: policy)
+    monkeypatch.setattr(selection, "load_policy", lambda folder, _: int(folder.name[-1]))
+    monkeypatch.setattr(
+        selection, "figures",
+        lambda seed: dict(zip(("violation_rate", "return"), found[seed], strict=True)),
+    )  # fmt: skip
+    trained = []
+
+    def as_trained(task, folder, *, seed, resume):
+        trained.append(seed)
+        write_policy(load_policy().network, folder, control_period=5e-3, provenance={"seed": seed})
+
+    monkeypatch.setattr(selection, "train", as_trained)
+    for seeds in ([1, 2], [1, 2, 3]):  # the first time it is stopped after two
+        table = train_seeds(TASK, tmp_path, seeds=seeds)
+    assert trained == [1, 2, 3]
+    assert list(table["seed"]) == [3, 2, 1]
+    assert list(pd.read_csv(tmp_path / selection.TABLE)["seed"]) == [3, 2, 1]
 
 
 @pytest.mark.parametrize(

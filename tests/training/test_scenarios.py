@@ -17,6 +17,7 @@ from training.evaluation.scenarios import (
     EVALUATION,
     LEVELS,
     REFILL_TIME,
+    SENSOR_FAULTS,
     TUNING_REGION,
     VENTED_DROP_BAR,
     effect_levels,
@@ -31,7 +32,7 @@ def settings(name):
 
 
 def test_the_environment_accepts_every_scenario():
-    for name, scenario in {**EVALUATION, **BEYOND, **worn_scenarios()}.items():
+    for name, scenario in {**EVALUATION, **BEYOND, **SENSOR_FAULTS, **worn_scenarios()}.items():
         assert " at 0x" not in repr(scenario)  # the subject of a journal: an address would begin it anew
         options = {"control_period": REFERENCE_PERIOD, "parameters": TUNING_REGION, **scenario.options}
         assert make_settings(Plant.calibrated(), **options).control_period > 0, name

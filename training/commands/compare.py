@@ -54,9 +54,7 @@ class Options(Episodes):
         str | None, {"metavar": "LABEL"}, "whom the others are set against (the first)"
     ] = None
     plants: Annotated[Sequence[str], {"nargs": "+", "choices": PLANT_SETS}, "sets of plants"] = PLANTS
-    scenarios: Annotated[
-        Names, "scenarios, or the groups named, beyond (beyond training), worn (one effect each)"
-    ] = (RANDOM,)
+    scenarios: Annotated[Names, "scenarios, or the groups named, beyond, faults, worn"] = (RANDOM,)
     episodes: Annotated[Count, "in each scenario and plant set"] = 1024
     decisions: Annotated[Count, "whose time is measured"] = 1000
     quick: Quick = False

@@ -93,7 +93,7 @@ def controller_c(export: Export) -> ControllerC:
     }
     shapes = {4: table["gain"].shape[1:]}
     c = ControllerC(constants=constants, shapes=shapes, indices=("t",), records=RECORDS)
-    c.function(sensor_check.hold, (SENSES, PLANT))
+    c.function(sensor_check.hold, (SENSES, ARRAY, PLANT, REAL))
     c.function(sensor_check.remember, (SENSES,))
     c.function(sensor_check.show, (SENSES, ARRAY))
     c.function(sensor_check.watch, (SENSES, ARRAY, PLANT, REAL))

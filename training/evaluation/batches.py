@@ -22,6 +22,7 @@ from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
 from training.evaluation.metrics import EpisodeMetrics
 from training.evaluation.rollout import run_episodes
+from training.evaluation.sensor_faults import Fault
 
 BATCH_EPISODES = 512
 """Most episodes of a batch: larger ones are hardly faster, and a stopped run loses its unfinished
@@ -48,6 +49,8 @@ class Batch:
     """Of the environment."""
     restart_s: float | None = None
     """When the control unit restarts [s]; None: never."""
+    faults: Sequence[Fault] = ()
+    """Of the sensors that the controller reads."""
     device: str = "cpu"
     """On which they run: "cpu", or "cuda" for an accelerator, whose noise is another."""
 
@@ -105,8 +108,10 @@ def run_batches(
 
 
 def _placed(batch: Batch, controllers: Mapping[str, Controller]) -> Batch:
-    """The batch on the processor if its controller decides nowhere else."""
-    if batch.device == "cpu" or decides_on_device(controllers[batch.controller]):
+    """The batch on the processor if its controller decides nowhere else, or its sensors fail."""
+    if batch.device == "cpu":
+        return batch
+    if not batch.faults and decides_on_device(controllers[batch.controller]):
         return batch
     return replace(batch, device="cpu")
 
@@ -160,6 +165,7 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
             duration=batch.duration,
             options={"threads": 1, **batch.options},
             restart_s=batch.restart_s,
+            **({"faults": batch.faults} if batch.faults else {}),
         )
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}
 

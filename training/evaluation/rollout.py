@@ -14,6 +14,7 @@ from controllers.base import Controller, Privileged
 from epv_env.vector_env import EPValvePWMVectorEnv, EPValveVectorEnv
 from training.evaluation.metrics import METER, EpisodeMetrics, count_all
 from training.evaluation.seeds import TIMING_SEED
+from training.evaluation.sensor_faults import Fault, SensorFaults
 
 NEVER, NOTHING = -1, np.empty((0, 0, 0))
 """Instead of a period before which the control unit restarts, and of arrays."""
@@ -65,6 +66,7 @@ def run_begun(
     periods: int,
     restart: int = NEVER,
     record: NDArray = NOTHING,
+    faults: SensorFaults | None = None,
 ) -> NDArray:
     """Run episodes that have begun with an observation (n, entries); returns records of METER (n,).
 
@@ -72,13 +74,16 @@ def run_begun(
     once and nothing later counts. Its valve runs on unseen, since the batch runs as one.
 
     restart: period before which the control unit restarts, so that the controller forgets everything; a
-    privileged one remembers. record: filled with actions and p2 [Pa], (periods, 2, n).
+    privileged one remembers. record: filled with actions and p2 [Pa], (periods, 2, n). faults: of the
+    sensors that the controller reads.
     """
     own: Any = env.unwrapped
     settings, meters = own.settings, np.zeros(len(observation), METER)
     for k in range(periods):
         if k == restart and not isinstance(controller, Privileged):
             controller.reset(len(meters))
+        if faults is not None:
+            observation = faults.shown(observation)
         actions = controller.act(observation)
         result = env.advance(actions)
         observation = result.observation
@@ -97,6 +102,7 @@ def run_episodes(
     duration: float,
     options: dict[str, Any],
     restart_s: float | None = None,
+    faults: Sequence[Fault] = (),
 ) -> EpisodeMetrics:
     """Run one episode per seed, as `run_begun` does; returns their metrics.
 
@@ -106,12 +112,15 @@ def run_episodes(
         duration: of each episode [s].
         options: of the environment.
         restart_s: when the control unit restarts, and the plant goes on [s]; None: never.
+        faults: of the sensors that the controller reads, from BEGINS_S on.
     """
     env = make_env(controller, len(seeds), **options)
     observation, period = begin_episodes(env, controller, seeds), env.settings.control_period
     restart = NEVER if restart_s is None else round(restart_s / period)
     periods = round(duration / period)
-    meters = run_begun(env, controller, observation, periods=periods, restart=restart)
+    rng = np.random.default_rng(seeds[0])
+    failing = SensorFaults(faults, len(seeds), period, rng) if faults else None
+    meters = run_begun(env, controller, observation, periods=periods, restart=restart, faults=failing)
     return EpisodeMetrics.of(meters, period)
 
 

@@ -19,6 +19,7 @@ from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.parameters import table
 from epv_env.plant.supply import Supply
 from epv_env.signals import MovingTarget
+from training.evaluation.sensor_faults import FAULTS, Fault
 
 TUNING_REGION = "sensitive_ten_percent"
 """Plants tuned on: those that PPO trains on."""
@@ -37,6 +38,8 @@ class EvaluationScenario:
     """Of an episode [s]; None: as long as the comparison's others."""
     restart_s: float | None = None
     """When the control unit restarts, so that the controller forgets everything [s]; None: never."""
+    faults: tuple[Fault, ...] = ()
+    """Of the sensors that the controller reads, from `sensor_faults.BEGINS_S` on."""
 
 
 def consumption(like: str | None = None, **ranges: Any) -> Scenario:
@@ -145,7 +148,6 @@ BEYOND: dict[str, EvaluationScenario] = {
     # Training ends at 5.5 g/s.
     "8 g/s": _situation(scenario=consumption("steps", flow=(8.0, 8.0))),
     "restart": EvaluationScenario(restart_s=5.0),
-    "p3 frozen": _situation(conditions={"frozen_p3": 1.0, "frozen_p3_s": 2.0}),
     # Table 1 allows 1.6 % of 16 bar.
     "p2 biased": _situation(effects={"pressure_sensor_bias": {"b_p2": 25.6e3}}),
     "latency of 5 ms": _situation(effects={"command_delay": 5e-3}),
@@ -153,6 +155,18 @@ BEYOND: dict[str, EvaluationScenario] = {
     "period of 6 ms": _situation(control_period=6e-3),
 }
 """Scenarios beyond training by name; plants within ±10 % (TUNING_REGION)."""
+
+FAULTY = ("p1", "p3", "current")
+"""Sensors that fail in a scenario. With p2 wrong no controller holds the band."""
+SENSOR_FAULTS: dict[str, EvaluationScenario] = {
+    **{
+        f"{channel} {fault}": EvaluationScenario(faults=((channel, fault),))
+        for channel in FAULTY
+        for fault in FAULTS[:-1]
+    },
+    "p1 and p3 swapped": EvaluationScenario(faults=(("p1", "swapped"), ("p3", "swapped"))),
+}
+"""Ordinary episodes in which a sensor fails, by name."""
 
 LEVELS = ("small", "typical", "top")
 """Sizes at which an effect of the gap catalogue is tried."""
@@ -204,13 +218,14 @@ def worn_scenarios() -> dict[str, EvaluationScenario]:
 def scenario_group(name: str) -> dict[str, EvaluationScenario]:
     """The scenarios that a name on a command line stands for: one, or a group of them.
 
-    Groups: `named` (ordinary situations), `beyond` (beyond training), `worn` (one effect each).
+    Groups: `named` (ordinary situations), `beyond` (beyond training), `faults` (of sensors), `worn` (one
+    effect each).
     Raises ValueError for an unknown name.
     """
-    groups = {"named": NAMED, "beyond": BEYOND, "worn": worn_scenarios()}
+    groups = {"named": NAMED, "beyond": BEYOND, "faults": SENSOR_FAULTS, "worn": worn_scenarios()}
     if name in groups:
         return groups[name]
-    known = {**EVALUATION, **BEYOND, **groups["worn"]}
+    known = {**EVALUATION, **BEYOND, **SENSOR_FAULTS, **groups["worn"]}
     if name not in known:
         raise ValueError(
             f"no scenario {name!r}: give {', '.join(groups)}, or some of {', '.join(known)}"

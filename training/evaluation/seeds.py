@@ -18,6 +18,9 @@ EVALUATION_SEED = 2_000_000
 VALIDATION_SEED = 3_000_000
 """On which a training chooses among the policies that it passes through."""
 
+SELECTION_SEED = 4_000_000
+"""On which the best of several trainings is chosen."""
+
 SWEEP_SEED = 5_000_000
 """Of sweeps; --seed counts from here."""
 

@@ -102,6 +102,7 @@ def compare(
             duration=scenario.duration or duration,
             options={"plant": plant, "parameters": region, **scenario.options},
             restart_s=scenario.restart_s,
+            faults=scenario.faults,
             device=device,
         )
     metrics = run_batches(

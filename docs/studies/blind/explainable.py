@@ -39,22 +39,24 @@ def recalibrated_parameters(truths: Sequence[TrueSignals]) -> Parameters:
     """All parameters, fitted to the calibration recordings' truth; most within their scatter."""
     base, limit = Parameters.calibrated(), UNIT_SCATTER_LIMIT * UNIT_SCATTER
     scatter = {
-        s: Freedom(
-            bounds=(base[s] * (1.0 - limit), base[s] * (1.0 + limit)),
-            mean=base[s],
-            sd=UNIT_SCATTER * base[s],
-        )
+        s: Freedom(bounds=(base[s] * (1.0 - limit), base[s] * (1.0 + limit)))
         for s in PARAMETER_COMPONENTS
     }
     vector = ParameterVector((*CALIBRATED_SYMBOLS, *scatter), base, scatter)
     comparison = _Comparison([true for true in truths if not is_held_out(true)], base)
+    first, unit = len(CALIBRATED_SYMBOLS), np.eye(len(vector.symbols))
+
+    def residuals(z: NDArray) -> NDArray:
+        """Of the outputs at scaled vectors (n, k), (values, n)."""
+        return comparison.residuals(dict(zip(vector.symbols, (z * vector.scale).T, strict=True)))
 
     def derivatives(z: NDArray) -> NDArray:
-        found = comparison.residuals(vector.values(z + DIFFERENCE_STEP * np.eye(len(z) + 1, len(z), -1)))
-        return np.vstack([(found[:, 1:] - found[:, :1]) / DIFFERENCE_STEP, vector.prior(z)[1]])
+        found = residuals(z + DIFFERENCE_STEP * np.vstack([0.0 * z, unit]))
+        slopes = (found[:, 1:] - found[:, :1]) / DIFFERENCE_STEP
+        return np.vstack([slopes, -unit[first:] / UNIT_SCATTER])
 
     fit = least_squares(
-        lambda z: np.append(comparison.residuals(vector.values(z)), vector.prior(z)[0]),
+        lambda z: np.append(residuals(z[None])[:, 0], (1.0 - z[first:]) / UNIT_SCATTER),
         np.ones(len(vector.symbols)),
         jac=derivatives,  # type: ignore[arg-type]
         bounds=vector.bounds.T,

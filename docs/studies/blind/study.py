@@ -4,7 +4,7 @@
 
 draws truths, records campaigns on a bench of its own, commits to the truths, diagnoses the campaigns
 blind, and only then opens the truths and scores. It writes results-FORMS.json and a
-table of README.md. Trials are kept in runs/blind/FORMS-SEED and not repeated:
+table of README.md. Trials are kept in runs/blind/CODE/FORMS-SEED and not repeated:
 
     NNNN/campaign/          all that the diagnosis gets
     NNNN/sealed.json        the truth

@@ -1,9 +1,10 @@
-"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, worn valves.
+"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, sensors that
+fail, worn valves.
 
     python -m docs.studies.comparison.study
 
 writes comparison.csv, differences.csv, beyond.csv, comparison.png, and the tables of both README.md.
-What is finished is kept in runs/comparison and not run again.
+What is finished is kept in runs/comparison/CODE and not run again.
 """
 
 import shutil
@@ -17,7 +18,8 @@ from docs.studies.common import PAGE, ROOT, fill, study_options, study_parser, t
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.options import parse
 from training.commands import compare
-from training.evaluation.scenarios import BEYOND
+from training.evaluation.scenarios import BEYOND, FAULTY
+from training.evaluation.sensor_faults import FAULTS
 
 FOLDER = Path(__file__).parent
 CONTROLLERS = (
@@ -30,13 +32,17 @@ CONTROLLERS = (
 )
 """The learned one, then what it is built on, classic ones, and one that knows each valve's
 parameters."""
-EPISODES, GROUPS, QUICK = 4096, {"beyond": 1024, "worn": 128}, 4
-"""Episodes in each plant set, in each scenario of a group, and under --quick."""
+EPISODES, QUICK = 4096, 4
+"""Episodes in each plant set, and under --quick."""
 PLANTS = "sensitive_ten_percent"
 """Plant set of the page's table and picture, and of the scenarios beyond training."""
-BEYOND_CONTROLLERS = CONTROLLERS[:4]
-"""Those in scenarios beyond training and on worn valves: what a control unit can run, but PWM, which
-leaves the band in ordinary episodes."""
+GROUPS = {
+    "beyond": (1024, CONTROLLERS[:4]),
+    "faults": (1024, CONTROLLERS[:1]),
+    "worn": (128, CONTROLLERS[:4]),
+}
+"""Episodes in each scenario of a group, and its controllers: what a control unit can run, but PWM, which
+leaves the band in ordinary episodes. The hysteresis reads no sensor that fails."""
 BEYOND_COLUMNS = [
     "scenario", "controller", "left_percent", "left_low", "left_high", "C1_worst_excursion_bar",
 ]  # fmt: skip
@@ -75,34 +81,49 @@ def beyond_table(rows: pd.DataFrame) -> str:
 
     rows: of beyond.csv.
     """
-    forms = dict.fromkeys(BEYOND_CONTROLLERS, "{left_percent:.2g}") | {CONTROLLERS[0]: SHARE}
+    forms = dict.fromkeys(CONTROLLERS, "{left_percent:.2g}") | {CONTROLLERS[0]: SHARE}
     cells = [forms[row["controller"]].format(**row) for row in rows.to_dict("records")]
     wide = rows.assign(cell=cells).pivot(index="scenario", columns="controller", values="cell")
-    lines = [[name, *wide.loc[name, list(BEYOND_CONTROLLERS)]] for name in BEYOND]
-    return table(["scenario", *BEYOND_CONTROLLERS], lines)
+    controllers = GROUPS["beyond"][1]
+    lines = [[name, *wide.loc[name, list(controllers)]] for name in BEYOND]
+    return table(["scenario", *controllers], lines)
+
+
+def fault_table(rows: pd.DataFrame) -> str:
+    """The policy's violation rate [%]: a row for each fault, a column for each sensor.
+
+    rows: of beyond.csv.
+    """
+    rates = {row["scenario"]: f"{row['left_percent']:.2g}" for row in rows.to_dict("records")}
+    lines = [[fault, *(rates[f"{name} {fault}"] for name in FAULTY)] for fault in FAULTS[:-1]]
+    swapped = rates["p1 and p3 swapped"]
+    return table(["fault", *FAULTY], [*lines, ["swapped", swapped, swapped, "–"]])
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     options = study_options(study_parser(__doc__ or "", FOLDER), arguments)
-    work = (options.out if options.quick else ROOT / "runs") / "comparison"
+    work = options.work / "comparison"
     quick, beyond = options.quick, []
     work.mkdir(parents=True, exist_ok=True)
     run_compare(work, CONTROLLERS, "--episodes", QUICK if quick else EPISODES, quick=quick)
-    for name, episodes in ({"beyond": QUICK} if quick else GROUPS).items():
+    for name, (episodes, controllers) in GROUPS.items():
+        if quick and name == "worn":
+            continue
         folder = work.with_name(f"comparison-{name}")
         folder.mkdir(parents=True, exist_ok=True)
-        own = ("--scenarios", name, "--plants", PLANTS, "--episodes", episodes)
-        run_compare(folder, BEYOND_CONTROLLERS, *own, quick=quick)
+        own = ("--scenarios", name, "--plants", PLANTS, "--episodes", QUICK if quick else episodes)
+        run_compare(folder, controllers, *own, quick=quick)
         beyond.append(pd.read_csv(folder / "comparison.csv"))
     for name in ("comparison.csv", "differences.csv", "comparison.png"):
         shutil.copy(work / name, options.out / name)
     rows = pd.concat(beyond)
     rows[BEYOND_COLUMNS].to_csv(options.out / "beyond.csv", index=False, float_format="%.3g")
     blocks = {"controllers": page_table(pd.read_csv(work / "comparison.csv"))}
-    fill(options.out / PAGE, {**blocks, "beyond": beyond_table(rows)})
+    blocks |= {"beyond": beyond_table(rows), "faults": fault_table(rows)}
+    fill(options.out / PAGE, blocks)
     if not quick:
-        fill(ROOT / "README.md", blocks)
+        fill(ROOT / "README.md", {"controllers": blocks["controllers"]})
     return 0
 
 

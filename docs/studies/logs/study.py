@@ -3,7 +3,7 @@
     python -m docs.studies.logs.study
 
 drives valves with and without an effect by the package's policy, and diagnoses their logs. valves.jsonl
-keeps each answer; logs and finished fits are in runs/logs.
+keeps each answer; logs and finished fits are in runs/logs/CODE.
 """
 
 import shutil
@@ -23,7 +23,7 @@ from docs.studies.blind.forms import deviating_sizes
 from docs.studies.blind.score import named_cause
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.files import Journal
+from epv_env.common.files import Journal, read_bytes, write_bytes
 from epv_env.common.options import COUNT
 from epv_env.plant.effects.registry import EFFECTS
 from epv_env.plant.lanes import coefficients_at, effects_at, inputs_at, state_at
@@ -169,12 +169,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     numbers, drives = ([2], QUICK) if options.quick else (range(options.valves), DRIVES)
     effects, policy = [effect.name for effect in EFFECTS], policy_digest(TRAINED)
     subject = {"seed": SEED, "drives": drives, "effects": effects, "policy": policy}
-    journal, answers = Journal(options.out / "valves.jsonl", subject), []
+    journal, answers = Journal(options.work / "valves.jsonl", subject), []
     for number in numbers:
         if str(number) not in journal:
             journal.add(str(number), answer(drawn(number, drives), options.work / str(number)))
             print(number, journal[str(number)], flush=True)
         answers.append(journal[str(number)])
+        write_bytes(options.out / journal.path.name, read_bytes(journal.path))
         fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
     return 0
 

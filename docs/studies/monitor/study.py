@@ -25,7 +25,7 @@ from controllers.tuned import tuned
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from docs.studies.logs.study import deviate
 from epv_env.common.command_line import fail_clearly
-from epv_env.common.files import Journal, digest, read_bytes
+from epv_env.common.files import Journal, digest, read_bytes, write_bytes
 from epv_env.common.results_folder import progress
 from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.effects.record import Size
@@ -265,7 +265,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     changed, unchanged = ((1, 1), (8, 1)) if options.quick else ((VALVES, PART), (UNCHANGED, DRIVES))
     model = digest(read_bytes(SHIPPED))
     subject = {"model": model, "seed": SEED, "changed": changed, "unchanged": unchanged}
-    journal = Journal(options.out / "results.jsonl", subject)
+    journal = Journal(options.work / "results.jsonl", subject)
     missing = {
         name: task
         for name, task in tasks(MonitorModel.load(SHIPPED), runs, changed, unchanged).items()
@@ -276,6 +276,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         if not name.startswith("changes"):  # what there is of the hours, so far
             report(journal, runs, options.out / PAGE)
     report(journal, runs, options.out / PAGE)
+    write_bytes(options.out / journal.path.name, read_bytes(journal.path))
     return 0
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import policy_digest
 from docs.studies.common import PAGE, fill, table
+from docs.studies.freshness import stale_tables
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, read_json
 from epv_env.common.options import COUNT
@@ -124,6 +125,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     statement = announced()
     remedy = f"restore {STATEMENT.name}, or move {RESULTS.name} away and announce the new statement"
     journal = Journal(RESULTS, {"statement": vars(statement)}, remedy=remedy)
+    if len(journal) and any(table["name"] == "statement" for _, table in stale_tables()):
+        raise ValueError(f"{RESULTS} holds episodes of other code: {remedy.partition(', or ')[2]}")
     count = -(-min(options.episodes or statement.episodes, statement.episodes) // BATCH)
     seeds = [
         (name, region, first)

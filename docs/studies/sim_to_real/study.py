@@ -3,7 +3,7 @@
     python -m docs.studies.sim_to_real.study --seeds 3
 
 writes results.csv, sim-to-real.png and the generated parts of README.md. Finished steps are kept in
-runs/sim_to_real and not repeated.
+runs/sim_to_real/CODE and not repeated.
 """
 
 import sys

@@ -188,14 +188,16 @@ def constants() -> tuple[Constant, ...]:
     return tuple(Constant(name, value, is_size=False) for name, value in values.items())
 
 
-def most_growth(p: Mapping[str, NDArray]) -> NDArray:
-    """Largest factor by which laws may raise a strength [1], shape as the parameters."""
+def most_growth(p: Mapping[str, NDArray], place: int) -> NDArray:
+    """Largest factor by which laws may raise the strength of the effect with this place [1], shape as
+    the parameters."""
     factor = np.full_like(p["law1_1"], 1.0)
     for slot in SLOTS:
         largest = p[knot_symbols(slot)[0]]
         for symbol in knot_symbols(slot)[1:]:
             largest = np.maximum(largest, p[symbol])
-        factor = factor * (1.0 + np.maximum(largest, 0.0))
+        acts = p[place_symbols(slot)[0]] == float(place)
+        factor = factor * np.where(acts, 1.0 + np.maximum(largest, 0.0), 1.0)
     return factor
 
 

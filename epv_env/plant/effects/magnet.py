@@ -13,10 +13,13 @@ from epv_env.plant.primitives import QUARTER_PI, inlined
 def steepness(u, knee):
     """Reciprocal of the differential inductance relative to that of linear iron [-].
 
-    u: level of saturation. knee: w_sat. (1 + u)^2 is that of the Froelich-Kennelly curve.
+    u: level of saturation. knee: w_sat. (1 + u)^2 is that of the Froelich-Kennelly curve, of which
+    iron that is saturated throughout leaves an eighth.
     """
     curve = (1.0 + u) * (1.0 + u)
-    return curve + knee * (1.0 + 16.0 * u * u * u * u - curve)
+    beyond, most = 1.0 + 16.0 * u * u * u * u, 8.0 * curve
+    beyond = most + (beyond < most) * (beyond - most)  # the smaller one, of arrays and in C, too
+    return curve + knee * (beyond - curve)
 
 
 def inverse_inductance(p: Mapping[str, NDArray]) -> NDArray:
@@ -32,7 +35,7 @@ MAGNETIC_SATURATION = Effect(
     strength=("saturation",),
     form=(
         "Φ = N I/(Rm + N I sMV); force from its coenergy, N² I²/(Rm² μ0 A) (ln(1+u) − u/(1+u))/u², "
-        "u = sMV N I/Rm; 1/L = Rm/N² ((1 − w_sat)(1+u)² + w_sat (1 + 16 u⁴))"
+        "u = sMV N I/Rm; 1/L = Rm/N² ((1 − w_sat)(1+u)² + w_sat min(1 + 16 u⁴, 8 (1+u)²))"
     ),
     source="Fröhlich 1881, Kennelly 1891; iron saturates at 1.6–2 T, that is 1.3–1.6·10⁻⁴ V s over A_MB",
     sizes=(

@@ -26,24 +26,35 @@ UNLIMITED = 1.0
 def step_limits(effects: tuple[Effect, ...]) -> tuple[Constant, ...]:
     """The longest steps as further constants of the kernel [s]."""
 
+    places = {effect.name: place for place, effect in enumerate(effects, start=1)}
+
     def steady_step(p: Mapping[str, NDArray]) -> NDArray:
         fastest = np.full_like(p["s_pipe"], STABLE / UNLIMITED)
         for effect in effects:
             if effect.fastest_rate:
-                fastest = np.maximum(fastest, effect.fastest_rate(p))
-        return STABLE / (fastest * law.most_growth(p))
+                growth = law.most_growth(p, places[effect.name])
+                fastest = np.maximum(fastest, effect.fastest_rate(p) * growth)
+        return STABLE / fastest
 
-    def step(rate: Callable[[Mapping[str, NDArray]], NDArray], stable: float) -> Callable[..., NDArray]:
-        """For a rate [1/s] that a law may raise."""
-        return lambda p: stable / np.maximum(rate(p) * law.most_growth(p), STABLE / UNLIMITED)
+    def step(
+        rate: Callable[[Mapping[str, NDArray]], NDArray], stable: float, name: str
+    ) -> Callable[..., NDArray]:
+        """For a rate [1/s] that a law of an effect may raise."""
+        return lambda p: (
+            stable / np.maximum(rate(p) * law.most_growth(p, places[name]), STABLE / UNLIMITED)
+        )
 
     return (
         # for all effects but clamp and friction
         Constant("steady_step", steady_step, is_size=False),
-        Constant("clamp_step", step(_clamp_rate, STABLE), is_size=False),
+        Constant("clamp_step", step(_clamp_rate, STABLE, "flyback_voltage"), is_size=False),
         # for the friction of a mover about to stop
-        Constant("slow_step_PV", step(_friction_rate_PV, FRICTION_STABLE), is_size=False),
-        Constant("slow_step_MV", step(_friction_rate_MV, FRICTION_STABLE), is_size=False),
+        Constant(
+            "slow_step_PV", step(_friction_rate_PV, FRICTION_STABLE, "piston_friction"), is_size=False
+        ),
+        Constant(
+            "slow_step_MV", step(_friction_rate_MV, FRICTION_STABLE, "armature_friction"), is_size=False
+        ),
     )
 
 

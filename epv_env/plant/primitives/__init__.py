@@ -50,23 +50,20 @@ def wide_vectors(typing_context=None):
     return types.void(), code
 
 
+_number = count()
+
+
 def generated(name: str, arguments: str, body: str, decorator=inlined, **names):
     """An inlined function from source text: one expression per field, so that no field is typed twice.
 
     LLVM vectorises plain indexing; a loop over the fields of a tuple would go through memory. `inspect`
     finds the text, as the export to C needs it.
     """
-    text, file, namespace = (
-        f"def {name}({arguments}):\n    {body}\n",
-        f"<{name} {next(_number)}>",
-        {**names},
-    )
+    text, file = f"def {name}({arguments}):\n    {body}\n", f"<{name} {next(_number)}>"
+    namespace = dict(names)
     linecache.cache[file] = len(text), None, text.splitlines(keepends=True), file
     exec(compile(text, file, "exec"), namespace)
     return decorator(namespace[name])
-
-
-_number = count()
 
 
 def replacing(kind, *fields: str):

@@ -15,6 +15,7 @@ from identification.gap.fit.variable_projection import (
     without_run_nuisances,
 )
 from identification.gap.plant import GreyBox, noise_weighted
+from identification.gap.prepare.noise import ChannelNoise
 from identification.report_2003 import partial_error, relative_error, total_error
 
 
@@ -137,6 +138,16 @@ def _unusual(estimate: Estimate) -> bool:
         if min(value - low, high - value) < margin and abs(value - p.nominal) > margin:
             return True
     return False
+
+
+def variance_inflation(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]) -> float:
+    """Variance of a parameter relative to that under white noise of the channels' size [1], at least 1.
+
+    Noise and discrepancy together count, and readings that are correlated tell less.
+    """
+    correlations = np.array([own.correlated for own in noise])
+    readings = sum(own.readings for own in noise)
+    return max(float(np.sum(correlations * each.squares)) / max(readings, 1), 1.0)
 
 
 @dataclass(frozen=True, kw_only=True)

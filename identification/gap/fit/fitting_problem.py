@@ -74,6 +74,8 @@ class Estimate:
     """Nuisance slopes taken at this estimate; None: those of the fitting problem."""
     chi_square: float = np.inf
     """Weighted sum of squares on the fitted runs, infinite before a fit [1]."""
+    steps: int = 0
+    """Steps that its fits have taken."""
     converged: bool = False
     given_up: bool = False
     """True where a rival hypothesis fits so much better that the fit was stopped."""
@@ -311,7 +313,7 @@ class FittingProblem:
         """Precision of the vector's Gaussian priors, and the vector less their means, (k,) each [1]."""
         parameters = self.parameters(estimate)
         precision = np.array([(p.scale / p.sd) ** 2 for p in parameters])
-        return precision, estimate.vector - np.array([p.nominal / p.scale for p in parameters])
+        return precision, estimate.vector - np.array([p.mean / p.scale for p in parameters])
 
     def slopes_of(self, estimate: Estimate) -> NuisanceSlopes:
         """Nuisance slopes that hold for an estimate."""

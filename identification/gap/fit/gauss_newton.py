@@ -173,6 +173,7 @@ def fit(
     starts: Sequence[Estimate],
     rival_chi_square: float = np.inf,
     iterations: int = 20,
+    precision: float = 1.0,
 ) -> list[Estimate]:
     """Fit every start to the fitted runs, until each fit has converged or is given up.
 
@@ -182,10 +183,12 @@ def fit(
         rival_chi_square: least chi-square of earlier fits against which these compete [1].
         iterations: most of them, for computing time; a fit that needs more is weighed as it is and
             reported as not converged.
+        precision: decrease of chi-square at which a fit ends, relative to that at which nothing that
+            is judged changes [1].
     """
     if not starts:
         return []
-    searches = [_Search(problem, start) for start in starts]
+    searches = [_Search(problem, start, precision) for start in starts]
     active = searches
     for _ in range(iterations + 1):
         linearised = linearise(problem, [search.trial for search in active], problem.fitted_runs)
@@ -201,8 +204,8 @@ def fit(
 class _Search:
     """The fit of one hypothesis."""
 
-    def __init__(self, problem: FittingProblem, start: Estimate):
-        self.problem = problem
+    def __init__(self, problem: FittingProblem, start: Estimate, precision: float):
+        self.problem, self.precision = problem, precision
         self.best = start
         self.trial = start
         self.damping = FIRST_DAMPING
@@ -224,7 +227,7 @@ class _Search:
             self.damping = min(10.0 * self.damping, MOST_DAMPING)  # Marquardt 1963
             current = self.equations
         step, decrease = current.step(*self.problem.ends(self.best), self.damping)
-        self.trial = replace(self.best, vector=self.best.vector + step)
+        self.trial = replace(self.best, vector=self.best.vector + step, steps=self.best.steps + 1)
         self._decide(decrease, rival_chi_square)
 
     def _accept(self, runs: Sequence[LinearisedRun], equations: NormalEquations) -> None:
@@ -243,7 +246,7 @@ class _Search:
         excess = self.best.chi_square - readings
         # A decrease of 0.3 changes no odds, and a cause that leaves much need not be fitted to the last
         # digit.
-        enough = max(0.3, 1e-3 * excess)
+        enough = self.precision * max(0.3, 1e-3 * excess)
         # A rival is far better; noise is not known to the percent.
         hopeless = 3.0 * max(rival_chi_square - readings, 0.0) + 0.05 * readings
         self.best = replace(

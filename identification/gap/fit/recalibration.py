@@ -4,7 +4,7 @@ A judgement must not hinge on the noise that somebody states: fits would end too
 channels would have wrong weights.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from identification.gap.fit.gauss_newton import fit, nuisance_slopes
 from identification.gap.plant import GreyBox
 from identification.gap.prepare.noise import ChannelNoise, raw_noise_ratio
 from identification.gap.prepare.prepared_plant import PreparedPlant, prepared
-from identification.readings_noise import white_noise
+from identification.noise import white_noise
 
 WRONG_NOISE_RATIO = 1.25
 """Ratio of the noise that the residuals show to the stated noise, or its inverse, above which the stated
@@ -23,7 +23,13 @@ noise is corrected [1]: less changes no judgement."""
 
 
 def recalibrate(
-    plant: GreyBox, cache: FitCache | None = None, prefix: str = ""
+    plant: GreyBox,
+    cache: FitCache | None = None,
+    prefix: str = "",
+    *,
+    start: Mapping[str, float] | None = None,
+    iterations: int = 20,
+    precision: float = 1.0,
 ) -> tuple[FittingProblem, Estimate]:
     """The nominal model with its calibrated parameters refitted, and the problem with its nuisances.
 
@@ -31,15 +37,22 @@ def recalibrate(
         plant: the model and its recordings.
         cache: runs the fits; None keeps nothing.
         prefix: of the names of both fits in the journal.
+        start: values by symbol [SI] where the fit begins; those left out, and None: nominal.
+        iterations: most of each of the two fits.
+        precision: of `fit` [1].
     """
+
+    def fitted(problem: FittingProblem, begun: Estimate) -> list[Estimate]:
+        return fit(problem, [begun], iterations=iterations, precision=precision)
+
     cache = cache or FitCache(plant)
     rough = FittingProblem(plant)
-    start = rough.start(Hypothesis(causes=()), {})
-    calibrated = cache(f"{prefix}calibration", lambda: fit(rough, [start]))[0]
+    first = rough.start(Hypothesis(causes=()), start or {})
+    calibrated = cache(f"{prefix}calibration", lambda: fitted(rough, first))[0]
     slopes = nuisance_slopes(rough, [calibrated], [np.zeros(len(plant.tolerances))])[0]
     problem = FittingProblem(plant, slopes)
     fits = cache(
-        f"{prefix}recalibration", lambda: fit(problem, [restarted(calibrated)]), problem.slopes_of
+        f"{prefix}recalibration", lambda: fitted(problem, restarted(calibrated)), problem.slopes_of
     )
     return problem, fits[0]
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import correlate
 
-from identification.gap.plant import Cause, Channel, GreyBox, PlantError, Ripple, Run, StateTrace
+from identification.gap.plant import Cause, Channel, GreyBox, PlantError, Run, StateTrace
 from identification.gap.prepare.noise import channel_noise
 from identification.gap.prepare.screened import Finding, bridged, screen
-from identification.readings_noise import white_noise
+from identification.noise import Ripple, white_noise
 
 
 class PreparedPlant:

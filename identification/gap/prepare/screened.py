@@ -18,7 +18,7 @@ from scipy.ndimage import median_filter
 from scipy.stats import norm
 
 from identification.gap.plant import Channel, PlantError, Run
-from identification.readings_noise import (
+from identification.noise import (
     NORMAL,
     differences,
     distances,

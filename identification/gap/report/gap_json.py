@@ -16,13 +16,12 @@ from scipy.stats import norm
 from epv_env.common.files import write_json
 from identification.block_bootstrap import LEVEL, Interval
 from identification.gap.diagnosis import Diagnosis
-from identification.gap.fit.evidence import EvaluatedHypothesis
+from identification.gap.fit.evidence import EvaluatedHypothesis, variance_inflation
 from identification.gap.fit.gaps import FLOOR
 from identification.gap.fit.laws import COMPONENTS, Law, in_words
 from identification.gap.judge.held_out import NOMINAL, RECALIBRATED
 from identification.gap.judge.verdict import RankedCause
 from identification.gap.locate.localisation import Localisation, MissingTerm
-from identification.gap.search.posterior import variance_inflation
 
 GAP, TERM = "gap.json", "missing_term.json"
 FORMAT = "epv-gap/4"
@@ -136,12 +135,11 @@ def as_json(diagnosis: Diagnosis, next_experiment: str = "", term: str | None = 
 def _cause(diagnosis: Diagnosis, cause: RankedCause) -> dict[str, Any]:
     """An entry of `causes`; the last two fields only where the reduction was measured."""
     label, laws = cause.hypothesis.label, cause.hypothesis.estimate.laws
-    differing = [(law, components) for law, components, _ in differing_laws(diagnosis, cause.hypothesis)]
     entry: dict[str, Any] = {
         "effects": list(cause.effects),
         "probability": cause.probability,
         "magnitude": {name: list(values) for name, values in magnitudes(diagnosis, cause).items()},
-        "form": in_words(differing),
+        "form": form_in_words(diagnosis, cause.hypothesis),
         "laws": [
             {
                 "effect": law.cause.label,
@@ -299,6 +297,11 @@ def parameter_intervals(
         low, high = sorted((p.low, p.high))
         intervals[p.symbol] = value, max(value - margin, low), min(value + margin, high)
     return intervals
+
+
+def form_in_words(diagnosis: Diagnosis, hypothesis: EvaluatedHypothesis) -> str:
+    """How the strengths of causes follow states otherwise than the catalogue assumes."""
+    return in_words([(law, z) for law, z, _ in differing_laws(diagnosis, hypothesis)])
 
 
 def differing_laws(

@@ -9,12 +9,12 @@ from epv_env.common.units import plain_powers
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis
 from identification.gap.fit.gaps import FLOOR
-from identification.gap.fit.laws import in_words as laws_in_words
+from identification.gap.fit.laws import AS_ASSUMED
 from identification.gap.judge.held_out import LEAST_GAP_CLOSED, RECALIBRATED
 from identification.gap.judge.verdict import NO_GAP, UNKNOWN, RankedCause
 from identification.gap.locate.localisation import Localisation
 from identification.gap.plant import FreeParameter, StateEquation
-from identification.gap.report.gap_json import differing_laws, discrepancy, remainder, share_left
+from identification.gap.report.gap_json import discrepancy, form_in_words, remainder, share_left
 from identification.report.page import templates
 
 MENTIONED_DISCREPANCY = 0.3
@@ -59,9 +59,7 @@ def words_of(diagnosis: Diagnosis) -> Words:
         "gap": gap_text,
         "gap_with_interval": gap_with_interval,
         "listed": lambda words: listed(list(words)),
-        "laws": lambda hypothesis: laws_in_words(
-            [(law, components) for law, components, _ in differing_laws(diagnosis, hypothesis)]
-        ),
+        "form": lambda hypothesis: form_in_words(diagnosis, hypothesis),
         "closed": lambda cause: share_text(diagnosis.share_closed(cause)),
         "words": lambda label: in_words(diagnosis, label),
         "inclusion": lambda name: probability_text(diagnosis.ranking.inclusion[name]),
@@ -97,6 +95,7 @@ def _context(diagnosis: Diagnosis) -> dict[str, Any]:
         "noise_level": FLOOR + LEAST_GAP_CLOSED,
         # Far above the noise as it was stated: no word may reassure.
         "far_above_noise": gap.value * noise > FAR_ABOVE_NOISE,
+        "as_assumed": AS_ASSUMED,
         "common": common,
         "rests": rests,
         "all_named": all(rests),

@@ -164,13 +164,3 @@ def misfit_beyond_noise(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]
         (float(squares) / own.floor - own.readings) / 2.0
         for squares, own in zip(each.squares, noise, strict=True)
     )
-
-
-def variance_inflation(each: EvaluatedHypothesis, noise: Sequence[ChannelNoise]) -> float:
-    """Variance of a parameter relative to that under white noise of the channels' size [1], at least 1.
-
-    Noise and discrepancy together count, and readings that are correlated tell less.
-    """
-    correlations = np.array([own.correlated for own in noise])
-    readings = sum(own.readings for own in noise)
-    return max(float(np.sum(correlations * each.squares)) / max(readings, 1), 1.0)

@@ -11,7 +11,7 @@ from identification.bench.programmes import REPORT_SUITE, at_voltage
 from identification.bench.session import measured_campaign, run_programme
 from identification.calibration.problem import CalibrationProblem, calibration_problem
 from identification.calibration.search import weighted_least_squares
-from identification.confidence.covariance import estimate_covariance
+from identification.confidence import estimate_covariance
 from identification.pipeline import identification
 from identification.recordings.recording import Campaign, rules_of
 
@@ -39,10 +39,9 @@ def problem() -> CalibrationProblem:
 @cache
 def estimate():
     """The scaled estimate (k,) and its covariance (k, k)."""
-    misfit = problem().least_squares()
-    fit = weighted_least_squares(misfit, problem().vector.scaled(problem().vector.reference))
+    fit = weighted_least_squares(problem(), problem().vector.scaled(problem().vector.reference))
     assert fit.converged
-    return fit.z, estimate_covariance(problem(), misfit, fit.z, seed=0).total
+    return fit.z, estimate_covariance(problem(), fit.z)[0]
 
 
 def test_its_truth_lies_in_the_joint_region_of_its_estimate():

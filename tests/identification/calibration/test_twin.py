@@ -20,8 +20,8 @@ TOLERANCE = {"alphaMV": 3e-4, "alphaPV": 9e-4, "RML": 8e-4, "R": 3e-4}
 def fitted(problem, method="least squares"):
     start = problem.vector.scaled(problem.vector.reference)
     if method == "least squares":
-        return weighted_least_squares(problem.least_squares(), start)
-    return nelder_mead(problem.total_error(), start)
+        return weighted_least_squares(problem, start)
+    return nelder_mead(problem, start)
 
 
 def apart(problem, z):

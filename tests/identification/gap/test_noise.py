@@ -8,15 +8,9 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from identification.gap.plant import Channel, Ripple
-from identification.gap.prepare.noise import (
-    LEAST,
-    RAW_TOLERANCE,
-    ChannelNoise,
-    autocovariance,
-    residual_noise,
-)
-from identification.readings_noise import white_noise
+from identification.gap.plant import Channel
+from identification.gap.prepare.noise import RAW_TOLERANCE, ChannelNoise, residual_noise
+from identification.noise import LEAST, Ripple, autocovariance, white_noise
 
 PERIOD, SAMPLES, RUNS = 1e-3, 4000, 3
 

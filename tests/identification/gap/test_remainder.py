@@ -10,6 +10,7 @@ import pytest
 from docs.examples.tank import Tank, virtual_recordings
 from identification.block_bootstrap import Interval
 from identification.gap.diagnosis import Diagnosis, diagnose
+from identification.gap.fit.evidence import variance_inflation
 from identification.gap.judge.verdict import NO_GAP, PARTIAL, UNKNOWN
 from identification.gap.report.gap_json import (
     GAP,
@@ -21,7 +22,6 @@ from identification.gap.report.gap_json import (
     write_results,
 )
 from identification.gap.report.sentences import verdict_sentence
-from identification.gap.search.posterior import variance_inflation
 from tests.identification.gap.tanks import TANKS, diagnosed
 
 

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from identification.readings_noise import quantisation_step
+from identification.noise import quantisation_step
 from identification.recordings.campaign_files import read_campaign, write_campaign
 from identification.recordings.noise import campaign_steps, coarse_step_warnings
 from identification.recordings.recording import PRESSURES, CampaignError

@@ -66,7 +66,7 @@ def test_a_supply_with_a_life_of_its_own_is_followed_within_millibars(name, life
 
 @pytest.mark.parametrize("life", LIVES)
 def test_the_air_balance_alone_would_miss_it(monkeypatch, life):
-    monkeypatch.setattr(drive, "_is_white", lambda residual, period: True)
+    monkeypatch.setattr(drive, "is_white", lambda residual, length: True)
     assert rms(supply_error("test4", life=LIVES[life])) > 0.5 * NOISE
 
 

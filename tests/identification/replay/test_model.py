@@ -6,7 +6,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from identification.calibration.problem import ParameterVector, WeightedResiduals, report_weights
 from identification.recordings.recording import OUTPUTS
 from identification.replay import replay
 from identification.replay.model_inputs import model_inputs
@@ -108,9 +107,3 @@ def cut():
     whole = exact_recording("test4", 500.0, share=1.0)
     short = {name: getattr(whole, name)[:10] for name in ("I", "U", "p1", "p2", "p3", "sigma_S")}
     return replace(whole, **short)
-
-
-def test_the_misfit_of_such_a_candidate_is_a_large_number():
-    vector = ParameterVector(("alphaMV", "R"), TRUE)
-    misfit = WeightedResiduals([cut()], vector, report_weights([cut()]))
-    assert misfit.error(np.array([np.nan, 1.0])) > 1e3 * misfit.error(np.ones(2))

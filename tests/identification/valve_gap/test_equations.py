@@ -7,7 +7,7 @@ import pytest
 
 from epv_env.plant.equations import Inputs, State
 from identification.gap.plant import StateEquation, window_forcing
-from identification.valve_gap.equations import EQUATIONS, FORCINGS
+from identification.replay.equations import EQUATIONS, FORCINGS
 from identification.valve_gap.valve import Valve
 from tests.identification.valve_gap.campaigns import campaign
 

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import epv_env  # noqa: F401 - registers the environments
-from controllers.policy import load_policy
+from controllers.tuned import tuned
 from epv_env.common.units import GRAM
 from epv_env.operation_log import OperationLog
 from epv_env.plant.plantfile import Plant
@@ -33,7 +33,9 @@ PLANT = Plant.calibrated()
 @pytest.fixture(scope="module")
 def healthy(tmp_path_factory):
     folder = tmp_path_factory.mktemp("logs") / "valve"
-    write_log(folder, load_policy(), PLANT, range(2), duration=10.0, scenario="service")
+    write_log(
+        folder, tuned("extrapolating hysteresis"), PLANT, range(2), duration=10.0, scenario="service"
+    )
     return folder
 
 
@@ -46,7 +48,8 @@ def test_a_log_holds_what_the_controller_read(healthy):
     # The readings at a switching are still those of the coil before it.
     off = np.flatnonzero(np.diff(first.coil) < 0) + 1
     assert np.all(first.I[off] > 0.3)
-    assert np.all(first.I[off[off + 2 < len(first.I)] + 2] < 0.1)
+    later = off[off + 2 < len(first.I)] + 2
+    assert np.all(first.I[later[first.coil[later - 1] == 0]] < 0.1)
 
 
 def test_openings_begin_steady_and_know_the_leak(tmp_path):
@@ -175,7 +178,14 @@ def test_cause_and_onset_are_found(tmp_path):
     eddy = {"eddy_current": {"G_eddy": 0.004}}
     folder = tmp_path / "log"
     write_log(
-        folder, load_policy(), PLANT, range(3), duration=20.0, scenario="steps", effects=eddy, onset=1
+        folder,
+        tuned("extrapolating hysteresis"),
+        PLANT,
+        range(3),
+        duration=20.0,
+        scenario="steps",
+        effects=eddy,
+        onset=1,
     )
     assert main(["gap", str(folder), "--logs", "--out", str(tmp_path / "out")]) == 0
     content = json.loads((tmp_path / "out" / "gap.json").read_text())

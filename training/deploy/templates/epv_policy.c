@@ -48,9 +48,7 @@ void epv_policy_observe(epv_policy_memory *m, const epv_policy_readings *now,
     s->now[2] = now->p3;
     s->now[3] = now->current;
     s->now[4] = now->target;
-    fn_hold(s);
-    fn_remember(s);
-    if (s->periods == 1.0f)
+    if (s->periods == 0.0f)
         m->waited = LONGEST_WAIT;
     else if (now->coil != m->coil)
         m->waited = 1;
@@ -60,6 +58,8 @@ void epv_policy_observe(epv_policy_memory *m, const epv_policy_readings *now,
     since = (float)m->waited * PERIOD;
     inputs[$action] = fn_entry((float)now->coil, $action);
     inputs[$since] = fn_entry(lesser(since, LONGEST), $since);
+    fn_hold(s, inputs, EPV_POLICY_READINGS, PERIOD);
+    fn_remember(s);
     fn_show(s, inputs, EPV_POLICY_READINGS);
 }
 

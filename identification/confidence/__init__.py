@@ -1,1 +1,0 @@
-"""How sure the estimates are (section 6.3)."""
