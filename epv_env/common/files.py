@@ -10,7 +10,6 @@ import secrets
 import shutil
 import stat
 import zlib
-from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from os import PathLike
@@ -181,10 +180,11 @@ def _parsed(text: str, *, allow_nan: bool) -> Any:
         return float(name)
 
     def fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
-        found = dict(pairs)
-        if len(found) < len(pairs):  # programs disagree which of two counts
-            twice = next(name for name, count in Counter(name for name, _ in pairs).items() if count > 1)
-            raise ValueError(f"the field {twice[:40]!r} stands twice in an object")
+        found: dict[str, Any] = {}
+        for name, value in pairs:
+            if name in found:  # programs disagree which of the two counts
+                raise ValueError(f"the field {name[:40]!r} stands twice in an object")
+            found[name] = value
         return found
 
     content = json.loads(

@@ -155,27 +155,21 @@ def chosen(options: Options) -> tuple[object, ...]:
     )
 
 
-class Begun(msgspec.Struct):
-    """What is read of a training's configuration."""
-
-    options: dict[str, Any]
-    plant: dict[str, Any]
-
-
 def begin_folder(options: Options, plant: Plant) -> None:
     """Make the folder free for a new training, or check that it holds the one to go on with.
 
     Raises ValueError if the folder holds another training, or none to resume.
     """
     folder: Path = options.out
-    earlier = read_config(folder, Begun)
+    earlier = read_config(folder, dict[str, dict[str, Any]])
     if options.resume:
         if earlier is None:
             raise ValueError(f"nothing to resume in {folder}: leave --resume out")
         now = configuration(options, plant)
         same = {name: now["options"][name] for name in SAME_WHEN_RESUMED}
-        check_same(earlier.options, same, f"{folder} was trained with", "resume with the same")
-        if earlier.plant != now["plant"]:
+        begun = earlier.get("options", {})
+        check_same(begun, same, f"{folder} was trained with", "resume with the same")
+        if earlier.get("plant") != now["plant"]:
             raise ValueError(
                 f"the plant is another than {folder} was trained with: resume with the same plant file, "
                 "or choose another --out"

@@ -17,6 +17,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from controllers.base import Controller, decides_on_device
+from epv_env.common.field_types import numbers
 from epv_env.common.files import Journal
 from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
@@ -172,8 +173,4 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
 
 def kept_metrics(figures: Mapping[str, list[Any]], episodes: int) -> EpisodeMetrics:
     """Figures in a journal. Raises ValueError unless each is a number for each of so many episodes."""
-    arrays = {name: np.array(values) for name, values in figures.items()}
-    for array in arrays.values():
-        if array.shape != (episodes,) or array.dtype.kind not in "bif" or np.isnan(array).any():
-            raise ValueError("not a number for each episode")
-    return EpisodeMetrics(**arrays)
+    return EpisodeMetrics(**{name: numbers(values, episodes) for name, values in figures.items()})

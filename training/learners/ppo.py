@@ -296,9 +296,8 @@ def load_checkpoint(model: PPO, folder: Path, timesteps: int) -> bool:
             arrays = load(read_bytes(path))
         except (OSError, ValueError, KeyError, SafetensorError):
             continue  # torn
-        if {name: (array.shape, array.dtype) for name, array in arrays.items()} != forms:
-            continue
-        if not all(_sane(name, array) for name, array in arrays.items()):
+        found = {name: (array.shape, array.dtype) for name, array in arrays.items()}
+        if found != forms or not all(_sane(*each) for each in arrays.items()):
             continue  # no training writes that
         if arrays["timesteps"] >= timesteps:
             continue  # it would end the training with the policy that there is

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import numbers
 from epv_env.common.files import Journal
 from identification.gap.fit.laws import Law
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
@@ -197,16 +198,13 @@ class FitCache:
                 for label, argument, low, high in entry["laws"]
             ),
         )
-        shape = len(self.plant.parameters) + len(hypothesis.parameters)
-        vector, runs = np.array(entry["vector"], dtype=float), len(self.plant.runs)
-        run_values = np.array(entry["local"], dtype=float).reshape(runs, len(hypothesis.run_parameters))
-        numbers = np.r_[vector, run_values.ravel()]
-        if vector.shape != (shape,) or not np.all(np.isfinite(numbers)) or not entry["chi_square"] >= 0:
-            raise ValueError("not a number for each parameter")
+        count = len(self.plant.parameters) + len(hypothesis.parameters)
+        if not entry["chi_square"] >= 0:
+            raise ValueError("no sum of squares")
         return Estimate(
             hypothesis=hypothesis,
-            vector=vector,
-            run_values=run_values,
+            vector=numbers(entry["vector"], count),
+            run_values=numbers(entry["local"], len(self.plant.runs), len(hypothesis.run_parameters)),
             chi_square=entry["chi_square"],
             converged=entry["converged"],
             given_up=entry["given_up"],
