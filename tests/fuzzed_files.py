@@ -51,10 +51,6 @@ Use = Callable[[Path], object]
 VALVE = Plant.calibrated()
 
 
-def _copy(path: Path) -> None:
-    shutil.copytree(TRAINED, path.parent, dirs_exist_ok=True)
-
-
 def _decide(path: Path) -> None:
     policy = load_policy(path.parent)
     policy.reset(2)
@@ -75,19 +71,14 @@ def _plant(path: Path) -> None:
 
 def _gap(path: Path) -> None:
     _plant(path.with_name("plant.json"))
-    write_json(
-        path, {"format": FORMAT, "verdict": "partial", "causes": [], "ambiguity_set": [], "gap": {}}
-    )
+    empty = {"causes": [], "ambiguity_set": [], "gap": {}}
+    write_json(path, {"format": FORMAT, "verdict": "partial", **empty})
 
 
 @cache
 def _model() -> Any:
     settings: Any = {"parameters": "exact", "weights": RewardWeights()}
     return ppo.make_model(make_training_env(plant=VALVE, num_envs=2, **settings), seed=0)
-
-
-def _checkpoint(path: Path) -> None:
-    ppo.save_checkpoint(_model().learn(1), path.parents[1])
 
 
 def _resume(path: Path) -> None:
@@ -118,6 +109,11 @@ SEARCH = SearchResult(
 )  # fmt: skip
 
 
+def _search(content: Any) -> None:
+    found = SearchResult.from_json(content, START)
+    assert np.all(np.isfinite(found.z + found.error))
+
+
 @cache
 def _fit() -> Any:
     return recalibrate(prepared(Drive({"lag": 0.05})))
@@ -135,25 +131,24 @@ MAPPING = {
 }  # fmt: skip
 
 
-def _measured(dialect: str) -> tuple[Use, Use]:
-    """A measurement file, and its import."""
-    return (
-        lambda path: DIALECTS[dialect](path.with_suffix(""), switching()),
-        lambda path: read_files([path], ambient_bar=1.0),
-    )
-
-
-POLICY = _copy, _decide
+POLICY = lambda path: shutil.copytree(TRAINED, path.parent, dirs_exist_ok=True), _decide
 CAMPAIGN = (
     lambda path: write_campaign(campaign_of(switching()), path.parent),
     lambda path: read_campaign(path.parent),
 )
 LOG = (
-    lambda path: write_log(
-        path.parent, tuned("hysteresis"), VALVE, [0], duration=10.0, scenario="service"
-    ),
+    lambda path: write_log(path.parent, tuned("hysteresis"), VALVE, [0], duration=10.0),
     lambda path: steady_openings(read_log(path.parent), VALVE),
 )
+
+DIALECT_OF = {"csv": "psi", "mf4": "MDF 4", "mat": "MATLAB 5", "tdms": "TDMS", "parquet": "Parquet"}
+MEASURED = {
+    f"run.{ending}": (
+        partial(lambda write, path: write(path.with_suffix(""), switching()), DIALECTS[dialect]),
+        lambda path: read_files([path], ambient_bar=1.0),
+    )
+    for ending, dialect in DIALECT_OF.items()
+}
 
 FORMATS: dict[str, tuple[Use, Use]] = {
     "plant.json": (_plant, lambda path: json.dumps(plant_subject(load_plant(path)), allow_nan=False)),
@@ -167,10 +162,13 @@ FORMATS: dict[str, tuple[Use, Use]] = {
     "drive-1.csv": LOG,
     "monitor.json": (white_model().save, _monitor),
     "tuned.json": (lambda path: save_tunings(load_tunings(), path, load_search()), load_tunings),
-    f"checkpoints/{2 * ROLLOUT:010}.safetensors": (_checkpoint, _resume),
+    f"checkpoints/{2 * ROLLOUT:010}.safetensors": (
+        lambda path: ppo.save_checkpoint(_model().learn(1), path.parents[1]),
+        _resume,
+    ),
     ppo.VALIDATION_FILE: (
         lambda path: path.write_text(f"{','.join(ppo.ROW)}\n1,2,3,4,5,6,7\n"),
-        lambda path: max(row["score"] for row in ppo.read_rows(path.parent)),
+        lambda path: max((row["score"] for row in ppo.read_rows(path.parent)), default=0.0),
     ),
     CONFIG: (lambda path: write_options(path.parent, configuration(Options(), VALVE)), _config),
     GAP: (_gap, lambda path: diagnosis_text(path.parent)),
@@ -178,13 +176,9 @@ FORMATS: dict[str, tuple[Use, Use]] = {
         {name: [0.0, 1.0] for name in EpisodeMetrics.__annotations__} | {"stayed": [True, False]},
         lambda found: summary(kept_metrics(found, 2)),
     ),
-    "searches.jsonl": _journal(SEARCH.as_json(), partial(SearchResult.from_json, start=START)),
+    "searches.jsonl": _journal(SEARCH.as_json(), _search),
     "fits.jsonl": (_fits, _fits),
-    "run.csv": _measured("MPa, preamble"),
-    "run.mf4": _measured("MDF 4"),
-    "run.mat": _measured("MATLAB 5"),
-    "run.tdms": _measured("TDMS"),
-    "run.parquet": _measured("Parquet"),
+    **MEASURED,
 }
 """By the file's name: what writes a good one, with what belongs beside it, and how it is used."""
 

@@ -5,7 +5,6 @@ import importlib
 import io
 import json
 import os
-import pickle
 import re
 import tempfile
 import zipfile
@@ -73,29 +72,17 @@ def damaged_line(content: bytes, rng: np.random.Generator) -> bytes:
     return b"\n".join([header, line.encode(), *more, b""])
 
 
+ODD_NUMBERS = [*b"NaN 1e999 -0 1e308 -1e308 1e-320 0x1F =1+1".split(), b"9" * 5000, b""]
+ODD_BYTES = [np.float32(value).tobytes() for value in (np.nan, np.inf, -1e38, -1.0)]
+
+
 def damaged_number(content: bytes, rng: np.random.Generator) -> bytes:
     """A number of a text, or four bytes of arrays, replaced by one beyond sense."""
-    numbers = [found.span() for found in re.finditer(rb"-?\d+(\.\d+)?", content)]
+    begin, odd = int(rng.integers(len(content))), ODD_BYTES
+    end, numbers = begin + 4, list(re.finditer(rb"-?\d+(\.\d+)?", content))
     if content.isascii() and numbers:
-        (begin, end), odd = numbers[int(rng.integers(len(numbers)))], ODD_NUMBERS
-    else:
-        begin = int(rng.integers(len(content)))
-        end, odd = begin + 4, [np.float32(value).tobytes() for value in (np.nan, np.inf, -1e38, -1.0)]
+        (begin, end), odd = numbers[int(rng.integers(len(numbers)))].span(), ODD_NUMBERS
     return content[:begin] + odd[int(rng.integers(len(odd)))] + content[end:]
-
-
-ODD_NUMBERS = [
-    b"NaN",
-    b"1e999",
-    b"-0",
-    b"9" * 5000,
-    b"1e308",
-    b"-1e308",
-    b"1e-320",
-    b"0x1F",
-    b"=1+1",
-    b"",
-]
 
 
 def _places(value: Any):
@@ -106,25 +93,14 @@ def _places(value: Any):
             yield from _places(value[key])
 
 
-class Trap:
-    """A pickle of it makes a folder where it is loaded."""
-
-    def __init__(self, path: Path):
-        self.path = path
-
-    def __reduce__(self):
-        return os.mkdir, (str(self.path),)
-
-
-def other_content(trap: Trap, content: bytes, rng: np.random.Generator) -> bytes:
-    """What is no such file: pickles that run code, alone and in archives, bombs, other formats."""
-    archive, array = io.BytesIO(), io.BytesIO()
+def other_content(executed: Path, content: bytes, rng: np.random.Generator) -> bytes:
+    """What is no such file: a pickle that makes a folder, alone and within an archive, and others."""
+    trap, archive = f"cos\nmkdir\n(V{executed}\ntR.".encode(), io.BytesIO()
     with zipfile.ZipFile(archive, "w", zipfile.ZIP_DEFLATED) as file:
-        file.writestr("archive/data.pkl", pickle.dumps(trap))  # as torch writes it
+        file.writestr("archive/data.pkl", trap)
         file.writestr("zeros", bytes(2**24))
-    np.save(array, np.array([trap], dtype=object), allow_pickle=True)
     others = [
-        pickle.dumps(trap), archive.getvalue(), array.getvalue(), b"", b"{}", b"null", b"\n\n",
+        trap, archive.getvalue(), b"", b"{}", b"null", b"\n\n",
         content * 2, content.replace(b"{", b'{"format": "x", ', 1), b"\xef\xbb\xbf" + content,
         b"1," * 10**5, b'"' + b"x" * 10**6, b"\xff\xfe" + content,
         (2**20).to_bytes(8, "little") + b"[" * 2**20,
@@ -148,7 +124,7 @@ def spoil(path: Path, outside: Path, rng: np.random.Generator) -> None:
     if kind == 0:
         other_file(path, outside, rng)
     elif kind < 3:
-        path.write_bytes(other_content(Trap(outside.with_name("executed")), content, rng))
+        path.write_bytes(other_content(outside.with_name("executed"), content, rng))
     else:
         path.write_bytes(damages[int(rng.integers(len(damages)))](content, rng))
 

@@ -106,7 +106,7 @@ def test_what_is_finished_is_kept(finished):
 
 @pytest.mark.parametrize(
     ("file", "field", "words"),
-    [("diagnosis/plant.json", "provenance", "is of other recordings than"),
+    [("diagnosis/plant.json", "provenance", "is no diagnosis of"),
      ("withheld/plant.json", "effects", "is not the valve with command_delay=0.006")],
 )  # fmt: skip
 def test_what_was_edited_is_no_step_of_this_loop(finished, file, field, words, capsys):

@@ -132,11 +132,10 @@ def loop(options: Options, mounted: Mounted = lambda policy: policy) -> Results:
         print("[diagnose the campaign]", file=sys.stderr)
         gap.run(gap.Options(out / CAMPAIGN, out=out / DIAGNOSIS, seed=options.seed))
     corrected = load_plant(out / DIAGNOSIS / CORRECTED)
-    fitted = [r for r in read_campaign(out / CAMPAIGN).recordings if r.role != "quality"]
-    if corrected.provenance.get("recordings_sha256") != {r.name: r.sha256 for r in fitted}:
+    fitted = {r.name: r.sha256 for r in read_campaign(out / CAMPAIGN).recordings if r.role != "quality"}
+    if corrected.diagnosis is None or corrected.provenance.get("recordings_sha256") != fitted:
         raise ValueError(
-            f"{out / DIAGNOSIS} is of other recordings than {out / CAMPAIGN}: "
-            + AGAIN.format(out / DIAGNOSIS)
+            f"{out / DIAGNOSIS} is no diagnosis of {out / CAMPAIGN}: {AGAIN.format(out / DIAGNOSIS)}"
         )
     return results | deployed(AFTER, corrected, "diagnosis", options, mounted)
 
@@ -234,6 +233,9 @@ def trained(
     return load_policy(folder, plant)
 
 
+AGAIN = "remove {}, and the diagnosis runs again"
+
+
 class KeptDiagnosis(msgspec.Struct):
     """What the report takes from gap.json."""
 
@@ -241,9 +243,6 @@ class KeptDiagnosis(msgspec.Struct):
     causes: list[Any]
     ambiguity_set: list[Any]
     gap: dict[str, Any]
-
-
-AGAIN = "remove {}, and the diagnosis runs again"
 
 
 def kept_diagnosis(folder: Path) -> KeptDiagnosis:
@@ -254,8 +253,7 @@ def kept_diagnosis(folder: Path) -> KeptDiagnosis:
 def diagnosis_text(folder: Path) -> str:
     """Verdict and alternatives of the diagnosis in a folder."""
     verdict, diagnosis = kept_diagnosis(folder).verdict, load_plant(folder / CORRECTED).diagnosis
-    if diagnosis is None:  # which every diagnosis writes
-        raise ValueError(f"{folder / CORRECTED} has no alternatives: {AGAIN.format(folder)}")
+    assert diagnosis is not None  # which every diagnosis writes
     best, *others = diagnosis.alternatives
     first = f"{verdict}: {best.name.replace('_', ' ')} {best.probability:.2f}"
     return first + (f", {len(others)} more" if others else "")
