@@ -9,8 +9,9 @@ import numpy as np
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
+from epv_env import observation
 from epv_env.common.compilation import announce_compilation
-from epv_env.observation import CENTRE, SCALE
+from epv_env.observation import READINGS, read
 from epv_env.plant.primitives import source_digest
 from epv_env.task import LimitingTask
 
@@ -20,7 +21,7 @@ composed: Callable[..., Any] = numba.njit(error_model="numpy", inline="always")
 """Decorator of those that mainly call others: numba compiles them together with their caller, once."""
 
 # Closed over by the loops: numba's cache on disk notices a change in their own file only.
-DIGEST = source_digest(*Path(__file__).parent.glob("*.py"))
+DIGEST = source_digest(*Path(__file__).parent.glob("*.py"), Path(observation.__file__))
 """Of all functions that a loop over a batch may call."""
 
 
@@ -53,19 +54,34 @@ class Privileged(Controller, Protocol):
         ...
 
 
+def over_batch(decide: Callable[..., Any]) -> Any:
+    """A compiled function of one valve, `OneValve.decide`, over a batch: `OneValve.decide_all`."""
+    digest = DIGEST
+
+    @numba.njit(cache=True, nogil=True, error_model="numpy")
+    def decide_all(memory, observations, constants, period, actions):
+        if digest == "":
+            return
+        readings = np.zeros(1, READINGS)[0]
+        for i in range(len(memory)):
+            read(readings, observations[i])
+            actions[i] = decide(memory[i], readings, observations[i], constants, period)
+
+    return decide_all
+
+
 class OneValve:
     """A controller of one valve, over a batch of n.
 
     Its memory of a valve is a record, whose zeros mean that an episode begins. The compiled function
-    `decide(memory, observation, constants, period)` of its file changes memory and observation
-    (entries,), and gives 1 (coil on) or 0. C is translated from what it calls, and an accelerator
-    compiles it, too.
+    `decide(memory, readings, observation, constants, period)` of its file may change the first three,
+    and gives 1 (coil on) or 0. readings: the observation (entries,), read into a record of READINGS.
+    C is translated from what it calls, and an accelerator compiles it, too.
     """
 
     decide: ClassVar[Any]
     decide_all: ClassVar[Any]
-    """`decide` over a batch: (memory, observations, constants, period, actions). Each file has its own
-    loop: numba keeps none on disk that is handed the function to call."""
+    """`over_batch` of it: (memory, observations, constants, period, actions)."""
     record: np.dtype
     """Of a valve's memory."""
     constants: Any
@@ -86,12 +102,6 @@ class OneValve:
         seen = np.array(observations, dtype=np.float32)
         type(self).decide_all(self.memory, seen, self.constants, self.control_period, actions)
         return actions
-
-
-@compiled
-def in_unit(observation, i):
-    """Entry i of an observation (entries,) in its unit."""
-    return observation[i] * SCALE[i] + CENTRE[i]
 
 
 def decides_on_device(controller: Controller) -> bool:

@@ -1,16 +1,13 @@
 """Two-point control with hysteresis, with or without extrapolation of the measured pressure."""
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 
-from controllers.base import DIGEST, OneValve, compiled, composed, in_unit
+from controllers.base import OneValve, compiled, over_batch
 from controllers.registration import Choice, Range, Registration
-from epv_env.observation import INDEX, P2_LAGS
-
-_ERROR = INDEX["p2_error"]
+from epv_env.observation import P2_LAGS
 
 
 class Thresholds(NamedTuple):
@@ -22,35 +19,23 @@ class Thresholds(NamedTuple):
     shut_lookahead: float
     lag: int
     change: int
-    """Entry of the observation that holds the change over `lag` periods."""
+    """Place of `lag` in P2_LAGS."""
 
 
 @compiled
-def two_points(on, observation, thresholds, period):
-    """Whether the coil shall be on (1 or 0), for an observation (entries,) and whether it is on."""
-    error = in_unit(observation, _ERROR)
-    slope = in_unit(observation, thresholds.change) / (thresholds.lag * period)
+def two_points(on, r, thresholds, period):
+    """Whether the coil shall be on (1 or 0), for a record of READINGS and whether it is on."""
+    slope = r.p2_change[thresholds.change] / (thresholds.lag * period)
     if on > 0:
-        return 0.0 if error + thresholds.open_lookahead * slope < thresholds.open_below else 1.0
-    return 1.0 if error + thresholds.shut_lookahead * slope > thresholds.shut_above else 0.0
+        return 0.0 if r.error + thresholds.open_lookahead * slope < thresholds.open_below else 1.0
+    return 1.0 if r.error + thresholds.shut_lookahead * slope > thresholds.shut_above else 0.0
 
 
-@composed
-def decide(m, observation, p, period):
+@compiled
+def decide(m, r, observation, p, period):
     """One valve's decision (controllers.base.OneValve)."""
-    m.off = 1.0 - two_points(1.0 - m.off, observation, p, period)
+    m.off = 1.0 - two_points(1.0 - m.off, r, p, period)
     return 1.0 - m.off
-
-
-def _loop(digest: str) -> Any:
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, p, period, actions):
-        if digest == "":
-            return
-        for i in range(len(memory)):
-            actions[i] = decide(memory[i], observations[i], p, period)
-
-    return decide_all
 
 
 @dataclass(kw_only=True)
@@ -75,7 +60,7 @@ class Hysteresis(OneValve):
     """[s]"""
     name: str = "hysteresis"
     environment: str = "EPValve-v0"
-    decide, decide_all = staticmethod(decide), _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), over_batch(decide)
     record = np.dtype((np.record, [("off", np.float64)]))
 
     def __post_init__(self) -> None:
@@ -88,7 +73,7 @@ class Hysteresis(OneValve):
             )
         self.constants = Thresholds(
             self.open_below, self.shut_above, self.open_lookahead, self.shut_lookahead,
-            self.lag, INDEX[f"p2_change_{self.lag}"],
+            self.lag, P2_LAGS.index(self.lag),
         )  # fmt: skip
 
 

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 from controllers.base import DIGEST, Controller, compiled, composed
 from controllers.pulse import follow, nominal_knowledge
 from controllers.valve_learner import LEARNT, LEAST_HEAD, VALVE
-from epv_env.observation import LAYOUT
+from epv_env.observation import ENTRIES, READINGS, read, scaled
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.primitives import generated
 from epv_env.reward import BAND_BAR
@@ -46,17 +46,8 @@ HIGH_HEAD, FULL = 1.0, 0.5
 HORIZON = 0.1
 """Time over which consumption lowers p2 there [s]: an overshoot in an emergency does not last."""
 
-READINGS = len(LAYOUT)
-"""Number of the readings, which come first."""
-_CENTRE, _SCALE, _LIMIT = (
-    np.array([getattr(quantity, name) for quantity in LEARNT]) for name in ("centre", "scale", "limit")
-)
-
-
-@compiled
-def shown(value, k):
-    """The k-th learnt quantity as a policy sees it [-]."""
-    return min(max((value - _CENTRE[k]) / _SCALE[k], -_LIMIT[k]), _LIMIT[k])
+INPUTS = ENTRIES + len(LEARNT)
+"""Of a policy: the observation, and the learnt quantities behind it."""
 
 
 @compiled
@@ -93,8 +84,11 @@ def below_band(v, error):
 
 @compiled
 def forced(v, error):
-    """What rules and shields force for p2 - target as read [bar]: 1 coil on, -1 coil off, 0 nothing."""
-    if keeps_on(v) or above_band(error):
+    """What rules and shields force for p2 - target as read [bar]: 1 coil on, -1 coil off, 0 nothing;
+    2 coil on, whatever decides."""
+    if above_band(error):
+        return 2.0
+    if keeps_on(v):
         return 1.0
     return -1.0 if below_band(v, error) else 0.0
 
@@ -102,21 +96,24 @@ def forced(v, error):
 show_learnt: Any = generated(
     "show_learnt",
     "v, inputs",
-    "; ".join(f"inputs[{READINGS + k}] = shown(v.{entry.name}, {k})" for k, entry in enumerate(LEARNT)),
+    "; ".join(
+        f"inputs[{ENTRIES + k}] = scaled(v.{q.name}, {q.centre}, {q.scale}, {q.limit})"
+        for k, q in enumerate(LEARNT)
+    ),
     compiled,
-    shown=shown,
+    scaled=scaled,
 )
-"""Write the learnt quantities of one valve behind the readings, into inputs (all,) [-]."""
+"""Write the learnt quantities of one valve behind the observation, into inputs (all,) [-]."""
 
 
 @composed
-def describe(v, observation, c, period, inputs):
-    """Learn from an observation (entries,) of one valve, and write all that a policy sees into inputs.
+def describe(v, r, observation, c, period, inputs):
+    """Learn from the readings of one valve, and write all that a policy sees into inputs (all,) [-].
 
     c: a Knowledge.
     """
-    follow(v, observation, c, period)
-    for i in range(READINGS):
+    follow(v, r, observation, c, period)
+    for i in range(ENTRIES):
         inputs[i] = observation[i]
     show_learnt(v, inputs)
 
@@ -126,8 +123,10 @@ def _loop(digest: str) -> Any:
     def describe_all(valves, observations, c, period, inputs, kept_on):
         if digest == "":
             return
+        readings = np.zeros(1, READINGS)[0]
         for i in range(len(valves)):
-            describe(valves[i], observations[i], c, period, inputs[i])
+            read(readings, observations[i])
+            describe(valves[i], readings, observations[i], c, period, inputs[i])
             kept_on[i] = keeps_on(valves[i])
 
     return describe_all
@@ -155,7 +154,7 @@ class ValveKnowledge:
         self.valves[who] = 0
 
     def observe(self, observations: NDArray) -> NDArray:
-        """Take in observations (n, readings); returns them with the learnt quantities (n, all)."""
+        """Take in observations (n, entries); returns them with the learnt quantities (n, all)."""
         return self._described(self.valves, observations, self._kept_on)
 
     def overruled(self, actions: NDArray) -> NDArray:
@@ -170,7 +169,7 @@ class ValveKnowledge:
         return self._described(ending, observations, np.zeros(len(who), dtype=bool))
 
     def _described(self, valves: NDArray, observations: NDArray, kept_on: NDArray) -> NDArray:
-        inputs = np.empty((len(observations), READINGS + len(LEARNT)), dtype=np.float32)
+        inputs = np.empty((len(observations), INPUTS), dtype=np.float32)
         seen = np.ascontiguousarray(observations, dtype=np.float32)
         _describe_all(valves, seen, self._constants, self._period, inputs, kept_on)
         return inputs

@@ -8,30 +8,26 @@ so the check of the sensors comes first (controllers/sensor_check.py).
 from dataclasses import dataclass, field
 from os import PathLike
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, composed, in_unit
+from controllers.base import OneValve, compiled, over_batch
 from controllers.hysteresis import Hysteresis, Thresholds
-from controllers.knowledge import READINGS, above_band, describe, forced
+from controllers.knowledge import INPUTS, describe, forced
 from controllers.network import Network, Weights, forward
 from controllers.policy_files import read_policy
 from controllers.pulse import Knowledge, nominal_knowledge
 from controllers.sensor_check import SENSES, Ends, checked, ends_of, overruled
 from controllers.tuned import tuned
-from controllers.valve_learner import LEARNT, VALVE
-from epv_env.observation import INDEX
+from controllers.valve_learner import VALVE
 from epv_env.plant.plantfile import Plant, load_plant
 
 TRAINED = Path(__file__).parent / "trained"
 """The policy that comes with the package."""
 FALLBACK = "extrapolating hysteresis"
 """Takes over where sensors fail: the best of the controllers that do not read p3."""
-
-_ERROR = INDEX["p2_error"]
 
 
 class Parts(NamedTuple):
@@ -43,29 +39,15 @@ class Parts(NamedTuple):
     weights: Weights
 
 
-@composed
-def decide(m, observation, c, period):
+@compiled
+def decide(m, r, observation, c, period):
     """One valve's decision (controllers.base.OneValve). c: Parts."""
-    checked(m.senses, observation, c.ends, c.fallback, period)
-    describe(m.valve, observation, c.knowledge, period, m.inputs)
-    error = in_unit(observation, _ERROR)
-    force = forced(m.valve, error)
+    checked(m.senses, r, observation, c.ends, c.fallback, period)
+    describe(m.valve, r, observation, c.knowledge, period, m.inputs)
+    force = forced(m.valve, r.error)
     forward(c.weights, m.inputs, m.signals)
     off = force < 0 or (force == 0 and m.signals[0, 0] >= m.signals[0, 1])
-    if above_band(error):  # this shield holds for the fall-back, too
-        return 1.0
-    return overruled(m.senses, 0.0 if off else 1.0)
-
-
-def _loop(digest: str) -> Any:
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, c, period, actions):
-        if digest == "":
-            return
-        for i in range(len(memory)):
-            actions[i] = decide(memory[i], observations[i], c, period)
-
-    return decide_all
+    return 1.0 if force > 1 else overruled(m.senses, 0.0 if off else 1.0)
 
 
 @dataclass(kw_only=True)
@@ -79,7 +61,7 @@ class Policy(OneValve):
     """[s]"""
     name: str = "PPO"
     environment: str = "EPValve-v0"
-    decide, decide_all = staticmethod(decide), _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), over_batch(decide)
 
     def __post_init__(self) -> None:
         fallback = tuned(FALLBACK, self.plant)
@@ -87,7 +69,7 @@ class Policy(OneValve):
         signals = self.network.signals
         self.record = np.dtype((np.record, [
             ("senses", SENSES), ("valve", VALVE),
-            ("inputs", np.float32, (READINGS + len(LEARNT),)), ("signals", signals.dtype, signals.shape),
+            ("inputs", np.float32, (INPUTS,)), ("signals", signals.dtype, signals.shape),
         ]))  # fmt: skip
         self.constants = Parts(
             ends_of(self.plant.sensors), fallback.constants, nominal_knowledge(self.plant),

@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from safetensors import SafetensorError
 from safetensors.numpy import load, save
 
-from controllers.knowledge import RULES
+from controllers.knowledge import INPUTS, RULES
 from controllers.network import Network
 from controllers.valve_learner import LEARNT
 from epv_env.common.files import JSONFileError, digest, read_bytes, read_json, write_bytes, write_json
-from epv_env.observation import LAYOUT, contract
+from epv_env.observation import contract
 
 FORMAT = "epv-policy/2"
 WEIGHTS_FILE = "policy.safetensors"
@@ -162,7 +162,7 @@ def read_contract(folder: Path) -> PolicyContract:
 def _check_arrays(arrays: dict[str, NDArray], found: PolicyContract, folder: Path) -> None:
     """Raises PolicyError unless the arrays have the contract's shapes, one precision, finite values."""
     shapes: dict[str, tuple[int, ...]] = {ADVICE: (2,)}
-    inputs = len(LAYOUT) + len(LEARNT)
+    inputs = INPUTS
     for i in range(found.layers):
         bias = arrays.get(f"{i}.bias", np.zeros(0))  # the width of a hidden layer is the policy's own
         outputs = 2 if i == found.layers - 1 else len(bias) if bias.ndim == 1 else 1

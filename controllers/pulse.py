@@ -16,11 +16,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import DIGEST, OneValve, compiled, composed
+from controllers.base import OneValve, compiled, composed, over_batch
 from controllers.pulse_table import PulseTable, duration, nominal_table, pulse_tables
 from controllers.registration import Range, Registration
 from controllers.valve_learner import FILTER_TIME, LEAST_HEAD, VALVE, begin, observe
@@ -92,40 +91,29 @@ def nominal_knowledge(plant: Plant) -> Knowledge:
 
 
 @composed
-def follow(v, observation, c, period):
-    """Learn from one valve's observation (entries,), and plan. c: a Knowledge."""
+def follow(v, r, observation, c, period):
+    """Learn from one valve's readings, and plan. c: a Knowledge."""
     if v.begun == 0:
         begin(v, c.informed)
     total = 0.0
     for entry in observation:
         total += entry
     if math.isfinite(total):  # of what is not finite nothing is learnt
-        observe(v, c.table, int(v.plant), observation, period, c.filter_time, c.informed)
+        observe(v, c.table, int(v.plant), r, period, c.filter_time, c.informed)
     plan(v, c.table, int(v.plant), c.plan, period)
 
 
-@composed
-def decide(v, observation, c, period):
+@compiled
+def decide(v, r, observation, c, period):
     """One valve's decision (controllers.base.OneValve)."""
-    follow(v, observation, c, period)
+    follow(v, r, observation, c, period)
     return v.advised
-
-
-def _loop(digest: str) -> Any:
-    @numba.njit(cache=True, nogil=True, error_model="numpy")
-    def decide_all(memory, observations, c, period, actions):
-        if digest == "":
-            return
-        for i in range(len(memory)):
-            actions[i] = decide(memory[i], observations[i], c, period)
-
-    return decide_all
 
 
 class _Pulse(OneValve):
     """Acts as `plan` advises."""
 
-    decide, decide_all = staticmethod(decide), _loop(DIGEST)
+    decide, decide_all = staticmethod(decide), over_batch(decide)
     record = VALVE
 
 

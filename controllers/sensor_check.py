@@ -21,9 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from controllers.base import compiled, composed, in_unit
+from controllers.base import compiled, composed
 from controllers.hysteresis import two_points
-from epv_env.observation import CENTRE, HISTORY, INDEX, LIMIT, P2_LAGS, P3_LAGS, SCALE
+from epv_env.observation import HISTORY, read, write
 from epv_env.plant.channels import CURRENT, P1, P2, P3, Sensor
 
 HELD = 3
@@ -56,13 +56,7 @@ MOST_PERIODS = 65535.0
 CHANNELS = {"p1": P1, "p2": P2, "p3": P3, "current": CURRENT, "target": P2}
 """Whose ends bound each reading: a target beyond the sensor of p2 cannot be followed."""
 COUNT = len(CHANNELS)
-_P1, _P2, _P3, _I, _TARGET = range(COUNT)
-_ENTRIES = np.array([INDEX[name] for name in ("p1", "p2_error", "p3", "I", "target")])
-_P2_CHANGES, _P3_CHANGES = INDEX["p2_change_1"], INDEX["p3_change_1"]
-_P2_LAGS, _P3_LAGS = np.array(P2_LAGS), np.array(P3_LAGS)
-_ERROR, _COIL, _SINCE, _P3_STEP, _P3_MOVED = (
-    INDEX[name] for name in ("p2_error", "action", "since_switching", "p3_change_1", "p3_change_4")
-)
+_P1, _P2, _P3, _CURRENT, _TARGET = range(COUNT)
 
 START = np.array([10.0, 8.0, 8.0, 0.3, 8.0])
 """What is held before the first good readings, (5,) [bar, A]: the middle of the observation."""
@@ -71,10 +65,9 @@ SENSES = np.dtype(
     (
         np.record,
         [
-            ("now", np.float64, (COUNT,)),  # CHANNELS as read, then as held [bar, A]
-            ("last", np.float64, (COUNT,)),  # the last good ones
-            ("p2", np.float64, (HISTORY,)),  # held readings, the newest first [bar]
-            ("p3", np.float64, (HISTORY,)),
+            ("last", np.float64, (COUNT,)),  # CHANNELS: the last good readings [bar, A]
+            ("p2_history", np.float64, (HISTORY,)),  # held readings, the newest first [bar]
+            ("p3_history", np.float64, (HISTORY,)),
             ("lost", np.float64),  # periods in which a reading was lost, less what good ones made up for
             ("whole", np.float64),  # latest periods in a row without a loss
             ("periods", np.float64),  # since the reset
@@ -110,49 +103,55 @@ def is_good(value, ends, i):
 
 
 @compiled
-def settled(s, observation, period):
+def settled(s, r, period):
     """Whether p3 must obey the coil: it has been as it is for WAIT."""
     # What happened before the first observation is not known: the coil may have switched just then.
-    known = min(in_unit(observation, _SINCE), s.periods * period)
+    known = min(r.waited, s.periods * period)
     return known > WAIT - period / 2  # whole periods
 
 
 @compiled
-def is_possible(s, i, observation, period):
-    """Whether a reading can follow the last good one; p1 has been held before p3 is asked about."""
-    change = s.now[i] - s.last[i]
-    if i == _P1:
-        return abs(change) <= JUMP
-    if i != _P3:
-        return True
+def can_follow(s, r, period):
+    """Whether a reading of p3 can follow the last good one; p1 has been held before."""
+    change = r.p3 - s.last[_P3]
     fastest = FASTEST * period * (1 + s.lost)  # the last good one may be as old
-    if s.now[_P3] > s.now[_P1] + MARGIN or abs(change) > fastest:
+    if r.p3 > s.last[_P1] + MARGIN or abs(change) > fastest:
         return False
-    against = change if observation[_COIL] < 0 else -change
-    return against <= AGAINST or not settled(s, observation, period)
+    against = change if r.coil < 0.5 else -change
+    return against <= AGAINST or not settled(s, r, period)
 
 
 @compiled
-def hold(s, observation, ends, period):
-    """Put the last good readings in the place of lost ones, in `now`."""
-    if s.periods == 0:
-        for i in range(COUNT):
-            s.last[i] = START[i]
-        s.whole, s.fallback = HISTORY, 1.0
-    s.periods = min(s.periods + 1, MOST_PERIODS)
-    s.blind = 0.0 if is_good(s.now[_P2], ends, _P2) and is_good(s.now[_TARGET], ends, _TARGET) else 1.0
-    lost = 0.0
+def keep(s, i, value, good):
+    """Keep a channel's reading if it is good; gives the number of lost ones, 0 or 1."""
+    if good:
+        s.last[i] = value
+        return 0.0
+    return 1.0
+
+
+@compiled
+def begin(s):
+    """An episode begins: until readings are good, START is held."""
     for i in range(COUNT):
-        good = is_good(s.now[i], ends, i)
-        if i == _P2 and s.blind > 0:
-            good = False
-        if good and s.begun > 0:
-            good = is_possible(s, i, observation, period)
-        if good:
-            s.last[i] = s.now[i]
-        else:
-            lost = 1.0
-        s.now[i] = s.last[i]
+        s.last[i] = START[i]
+    s.whole, s.fallback = HISTORY, 1.0
+
+
+@compiled
+def hold(s, r, ends, period):
+    """Tell the good readings from the lost ones, for which the last good ones stand."""
+    if s.periods == 0:
+        begin(s)
+    s.periods = min(s.periods + 1, MOST_PERIODS)
+    target = is_good(r.target, ends, _TARGET)
+    p2 = is_good(r.p2, ends, _P2) and target  # an observation shows p2 by its distance from the target
+    s.blind = 0.0 if p2 else 1.0
+    p1 = is_good(r.p1, ends, _P1) and (s.begun == 0 or abs(r.p1 - s.last[_P1]) <= JUMP)
+    lost = keep(s, _P1, r.p1, p1)
+    p3 = is_good(r.p3, ends, _P3) and (s.begun == 0 or can_follow(s, r, period))
+    lost += keep(s, _P2, r.p2, p2) + keep(s, _P3, r.p3, p3) + keep(s, _TARGET, r.target, target)
+    lost += keep(s, _CURRENT, r.current, is_good(r.current, ends, _CURRENT))
     s.lost = min(s.lost + 1, MOST_PERIODS) if lost > 0 else max(s.lost - FORGIVEN, 0.0)
     s.whole = 0.0 if lost > 0 else min(s.whole + 1, MOST_PERIODS)
 
@@ -162,69 +161,47 @@ def remember(s):
     """Keep the held readings; the first ones stand for the past."""
     for k in range(1, HISTORY):
         older = HISTORY - k
-        s.p2[older] = s.p2[older - 1] if s.begun > 0 else s.now[_P2]
-        s.p3[older] = s.p3[older - 1] if s.begun > 0 else s.now[_P3]
-    s.p2[0], s.p3[0] = s.now[_P2], s.now[_P3]
+        s.p2_history[older] = s.p2_history[older - 1] if s.begun > 0 else s.last[_P2]
+        s.p3_history[older] = s.p3_history[older - 1] if s.begun > 0 else s.last[_P3]
+    s.p2_history[0], s.p3_history[0] = s.last[_P2], s.last[_P3]
     if s.whole > 0 or s.lost > HELD:
         s.begun = 1.0
 
 
 @compiled
-def entry(value, i):
-    """Entry i of an observation [-] from its value in its unit."""
-    return min(max((value - CENTRE[i]) / SCALE[i], -LIMIT[i]), LIMIT[i])
+def show(s, r, observation):
+    """Write what is held, and its changes, into an observation (entries,) [-]; read it again."""
+    write(observation, s, s.last[_P1], s.last[_CURRENT], s.last[_TARGET], r.coil, r.waited)
+    read(r, observation)
 
 
 @compiled
-def show(s, observation):
-    """Write what is held, and its changes, into an observation (entries,) [-]."""
-    observation[_ENTRIES[_P1]] = entry(s.now[_P1], _ENTRIES[_P1])
-    observation[_ENTRIES[_P3]] = entry(s.now[_P3], _ENTRIES[_P3])
-    observation[_ENTRIES[_I]] = entry(s.now[_I], _ENTRIES[_I])
-    observation[_ENTRIES[_TARGET]] = entry(s.now[_TARGET], _ENTRIES[_TARGET])
-    observation[_ERROR] = entry(s.now[_P2] - s.now[_TARGET], _ERROR)
-    for k in range(len(_P2_LAGS)):
-        observation[_P2_CHANGES + k] = entry(s.p2[0] - s.p2[_P2_LAGS[k]], _P2_CHANGES + k)
-    for k in range(len(_P3_LAGS)):
-        observation[_P3_CHANGES + k] = entry(s.p3[0] - s.p3[_P3_LAGS[k]], _P3_CHANGES + k)
-
-
-@compiled
-def implausible(s, observation, period):
+def implausible(s, r, period):
     """Whether p3 stands still where the coil should move it."""
-    p3 = s.now[_P3]
-    remains = s.now[_P1] - p3 if observation[_COIL] > 0 else p3 - AMBIENT
-    still = abs(in_unit(observation, _P3_MOVED)) < STILL and remains > MARGIN
+    p3 = s.last[_P3]
+    remains = s.last[_P1] - p3 if r.coil > 0.5 else p3 - AMBIENT
+    still = abs(r.p3_change[1]) < STILL and remains > MARGIN
     # A lost reading is held, which is no sign that p3 stands still.
-    still_far = abs(in_unit(observation, _P3_STEP)) < STILL and remains > FAR and s.whole > 0
-    return (still or still_far) and settled(s, observation, period)
+    still_far = abs(r.p3_change[0]) < STILL and remains > FAR and s.whole > 0
+    return (still or still_far) and settled(s, r, period)
 
 
 @compiled
-def watch(s, observation, thresholds, period):
-    """Judge the sensors by an observation of held readings; the hysteresis follows every valve."""
-    if s.lost > HELD or implausible(s, observation, period):
+def watch(s, r, thresholds, period):
+    """Judge the sensors by held readings; the hysteresis follows every valve."""
+    if s.lost > HELD or implausible(s, r, period):
         s.failed = 1.0
-    s.fallback = two_points(s.fallback, observation, thresholds, period)
-
-
-@compiled
-def read(s, observation):
-    """The readings behind an observation (entries,), into `now`."""
-    for k in range(COUNT):
-        s.now[k] = in_unit(observation, _ENTRIES[k])
-    s.now[_P2] += s.now[_TARGET]  # an observation shows p2 by its distance from the target
+    s.fallback = two_points(s.fallback, r, thresholds, period)
 
 
 @composed
-def checked(s, observation, ends, thresholds, period):
-    """Take in an observation (entries,), and put what is held into it."""
-    read(s, observation)
-    hold(s, observation, ends, period)
+def checked(s, r, observation, ends, thresholds, period):
+    """Check the readings of an observation (entries,), and put what is held into both."""
+    hold(s, r, ends, period)
     remember(s)
     if s.whole < HISTORY:  # a change over past readings reaches back to a loss
-        show(s, observation)
-    watch(s, observation, thresholds, period)
+        show(s, r, observation)
+    watch(s, r, thresholds, period)
 
 
 @compiled

@@ -18,9 +18,9 @@ from typing import Any
 
 import numpy as np
 
-from controllers.base import compiled, in_unit
+from controllers.base import compiled
 from controllers.pulse_table import gained_at_once, opens_at, time_to_open
-from epv_env.observation import INDEX, Quantity
+from epv_env.observation import Quantity
 from epv_env.reward import BAND_BAR
 
 OFFSETS = np.linspace(-2.2, 2.2, 45)
@@ -60,12 +60,12 @@ UNKNOWN_DEVIATION = 0.45
 LEAST_HEAD = 0.2
 """p1 - p2 below which the supply does not raise the circuit [bar]."""
 TOLERATED = BAND_BAR - 0.1
-"""Expected breakdown that needs no reserve [bar]: what the band allows, less the scatter at rest."""
+"""Expected pressure dip that needs no reserve [bar]: what the band allows, less the scatter at rest."""
 MOST_RESERVE = 0.3
 """Largest reserve [bar]: above it a pulse's scatter would leave the band upwards."""
 BREAKDOWN_MEMORY, REACHED = 60.0, 0.05
-"""Time in which the memory of a breakdown fades by 1/e [s]; distance below the target from which the
-target counts as reached [bar]: the way up to it is no breakdown."""
+"""Time in which the memory of a pressure dip fades by 1/e [s]; distance below the target from which the
+target counts as reached [bar]: the way up to it is no dip."""
 FILTER_TIME = 0.025
 """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
@@ -92,7 +92,7 @@ LEARNT = (
     Quantity("after_period", "bar", 0.0, 0.3, 4.0),  # the same after one period more off
     Quantity("after_period_early", "bar", 0.0, 0.3, 4.0),  # the same if the valve opens early
     Quantity("reserve", "bar", 0.0, 0.1, 4.0),  # how much higher p2 is held where the valve is slow
-    Quantity("deepest", "bar", 0.0, 0.25, 4.0),  # deepest breakdown lately
+    Quantity("deepest", "bar", 0.0, 0.25, 4.0),  # deepest pressure dip lately
     Quantity("head", "bar", 0.0, 2.0, 2.0),  # p1 - p2
     Quantity("margin", "bar", 0.0, 0.2, 2.0),  # these three: the adaptive pulse (controllers/pulse.py)
     Quantity("remaining", "s", 0.0, 0.02, 2.0),
@@ -115,10 +115,6 @@ VALVE = np.dtype((np.record,
 ))  # fmt: skip
 """State of a learner and what it knows of one valve; zeros: an episode begins. plant: its place in
 the table."""
-
-_ERROR, _TARGET, _P1, _P3, _COIL, _P2_CHANGE, _P3_CHANGE = (
-    INDEX[name] for name in ("p2_error", "target", "p1", "p3", "action", "p2_change_1", "p3_change_1")
-)
 
 
 @compiled
@@ -254,17 +250,17 @@ def follow_p2(v, error, shut, period, filter_time):
 
 
 @compiled
-def foresee(v, table, t, p1, p2, p3, period):
+def foresee(v, table, t, r, period):
     """What the learnt valve will do: times to open, rises of p2, reserve."""
-    v.opens_in_early = time_to_open(table, t, v.early_offset, p1, p2, p3) / v.pace
-    v.opens_from_rest = time_to_open(table, t, v.offset, p1, p2, p1) / v.pace
+    v.opens_in_early = time_to_open(table, t, v.early_offset, r.p1, r.p2, r.p3) / v.pace
+    v.opens_from_rest = time_to_open(table, t, v.offset, r.p1, r.p2, r.p1) / v.pace
     v.forecast = v.error + v.fall * (v.opens_in + table.release_lag[t])
-    later = p3 if v.on > 0 else p3 * math.exp(-table.vent_rate[t] * v.pace * period)
-    v.under_way = v.gain * gained_at_once(table, t, v.offset, p1, p2, p3)
-    v.after_period = v.gain * gained_at_once(table, t, v.offset, p1, p2, later)
+    later = r.p3 if v.on > 0 else r.p3 * math.exp(-table.vent_rate[t] * v.pace * period)
+    v.under_way = v.gain * gained_at_once(table, t, v.offset, r.p1, r.p2, r.p3)
+    v.after_period = v.gain * gained_at_once(table, t, v.offset, r.p1, r.p2, later)
     early = 0.0
-    if time_to_open(table, t, v.early_offset, p1, p2, later) <= 0:
-        early = gained_at_once(table, t, v.early_offset, p1, p2, later)
+    if time_to_open(table, t, v.early_offset, r.p1, r.p2, later) <= 0:
+        early = gained_at_once(table, t, v.early_offset, r.p1, r.p2, later)
     v.after_period_early = (v.gain + 2 * v.gain_deviation) * early
     expected = table.hardest_fall[t] * (table.release_lag[t] + v.opens_from_rest)
     v.reserve = min(max(expected - TOLERATED, 0.0), MOST_RESERVE)
@@ -280,45 +276,54 @@ def remember_breakdown(v, period):
 
 
 @compiled
-def observe(
-    v: Any, table: Any, t: int, reading: Any, period: float, filter_time: float, informed: bool
-) -> None:
-    """Take in one observation (entries,) of one valve.
-
-    v: record of VALVE, changed. table: of the plants. t: the valve's plant in the table. reading: an
-    observation [-], epv_env.observation.LAYOUT. period: control period [s]. filter_time: time in which
-    the weight of a reading of p2 fades by 1/e [s]. informed: whether the table is the valve's own, so
-    that nothing is learnt of the valve.
-    """
-    if v.begun == 0:
-        begin(v, informed)
-    error, p1, p3 = in_unit(reading, _ERROR), in_unit(reading, _P1), in_unit(reading, _P3)
-    p2 = error + in_unit(reading, _TARGET)
-    p2_change, p3_change = in_unit(reading, _P2_CHANGE), in_unit(reading, _P3_CHANGE)
-    on = reading[_COIL] > 0.0
-    if on and v.off_periods > 0:  # the pulse ended at the last reading
+def follow_coil(v, on):
+    """Count the periods since the last switching; what was read when a pulse ended is kept."""
+    if on and v.off_periods > 0:  # at the last reading
         v.end_p1, v.end_p2, v.end_p3, v.end_fall = v.p1, v.p2, v.p3, v.fall
         v.measuring = 1.0
     v.off_periods = 0.0 if on else v.off_periods + 1
     v.on_periods = v.on_periods + 1 if on else 0.0
     if not on:
         v.measuring = 0.0
-    if v.off_periods > 1 and not informed:
-        watch_opening(v, table, t, p1, p2, p3, p2_change - min(v.slope, 0.0) * period)
-        summarise(v)
-    v.opens_in = time_to_open(table, t, v.offset, p1, p2, p3) / v.pace
-    shut = v.opens_in > 0
-    follow_p2(v, error, shut, period, filter_time)
-    if shut and v.off_periods >= PERIODS_AFTER_RELEASE and not informed:
-        learn_pace(v, table, t, p3, p3_change, period)
+
+
+@compiled
+def learn(v, table, t, r, shut, period):
+    """Correct what is known of a valve by its readings; shut: whether it is expected to be shut."""
+    if shut and v.off_periods >= PERIODS_AFTER_RELEASE:
+        learn_pace(v, table, t, r.p3, r.p3_change[0], period)
     if v.measuring > 0 and shut and v.on_periods > 1:
-        if not informed:
-            lasted = v.on_periods * period
-            learn_pulse(v, table, t, p2 - v.end_p2 - v.end_fall * lasted, lasted)
-            summarise(v)
+        lasted = v.on_periods * period
+        learn_pulse(v, table, t, r.p2 - v.end_p2 - v.end_fall * lasted, lasted)
+        summarise(v)
         v.measuring = 0.0
-    v.on, v.p1, v.p2, v.p3, v.head = 1.0 if on else 0.0, p1, p2, p3, p1 - p2
+
+
+@compiled
+def observe(
+    v: Any, table: Any, t: int, r: Any, period: float, filter_time: float, informed: bool
+) -> None:
+    """Take in the readings of one valve.
+
+    v: record of VALVE, changed. table: of the plants. t: the valve's plant in the table. r: record of
+    epv_env.observation.READINGS. period: control period [s]. filter_time: time in which the weight of a
+    reading of p2 fades by 1/e [s]. informed: whether the table is the valve's own, so that nothing is
+    learnt of the valve.
+    """
+    if v.begun == 0:
+        begin(v, informed)
+    on = r.coil > 0.5
+    follow_coil(v, on)
+    if v.off_periods > 1 and not informed:
+        watch_opening(v, table, t, r.p1, r.p2, r.p3, r.p2_change[0] - min(v.slope, 0.0) * period)
+        summarise(v)
+    v.opens_in = time_to_open(table, t, v.offset, r.p1, r.p2, r.p3) / v.pace
+    shut = v.opens_in > 0
+    follow_p2(v, r.error, shut, period, filter_time)
+    if not informed:
+        learn(v, table, t, r, shut, period)
+    v.on, v.p1, v.p2, v.p3, v.head = 1.0 if on else 0.0, r.p1, r.p2, r.p3, r.p1 - r.p2
     v.fall = min(v.slope, 0.0)
     v.pace_deviation = math.sqrt(v.pace_variance)
-    foresee(v, table, t, p1, p2, p3, period)
+    foresee(v, table, t, r, period)
     remember_breakdown(v, period)

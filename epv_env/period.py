@@ -25,17 +25,7 @@ import numpy as np
 
 from epv_env.common.units import BAR
 from epv_env.episode import TARGET_STEPS
-from epv_env.observation import (
-    CENTRE,
-    HISTORY,
-    INDEX,
-    LIMIT,
-    LONGEST_WAIT,
-    P2_LAGS,
-    P3_LAGS,
-    SCALE,
-    scaled,
-)
+from epv_env.observation import HISTORY, LONGEST_WAIT, write
 from epv_env.plant.channels import CHANNEL, MEASURED, digitised
 from epv_env.plant.consumption import mean_flow
 from epv_env.plant.equations import Inputs, State
@@ -78,15 +68,11 @@ _RULES = ("control_period", "supply_voltage", "settling_time", *(f.name for f in
 RULES = np.dtype((np.record, [(name, np.float64) for name in _RULES]))
 """Record of the settings that a period needs, by their names."""
 
-for _rule in (digitised, two_point, scaled, reward_terms, total):
+for _rule in (digitised, two_point, reward_terms, total):
     exact(_rule)
 
 _SENSOR = np.array([CHANNEL[name].sensor.constants() for name in MEASURED])
 _P1, _P2, _P3, _I = (MEASURED.index(name) for name in ("p1", "p2", "p3", "I"))
-_ERROR, _TARGET, _SHOWN_P1, _SHOWN_P3, _SHOWN_I, _ACTION, _WAITED = (
-    INDEX[name] for name in ("p2_error", "target", "p1", "p3", "I", "action", "since_switching")
-)
-_P2_CHANGE, _P3_CHANGE = INDEX[f"p2_change_{P2_LAGS[0]}"], INDEX[f"p3_change_{P3_LAGS[0]}"]
 _EMPTY = EMPTY_CIRCUIT_BAR * BAR
 
 _true_readings = generated(
@@ -182,26 +168,10 @@ def remember(e):
 
 
 @exact
-def _show(row, k, value):
-    """Write entry k of an observation."""
-    row[k] = scaled(value, CENTRE[k], SCALE[k], LIMIT[k])
-
-
-@exact
 def observe(e, row):
     """Write the observation of an episode, (entries,) [-]."""
-    p2, p3 = e.p2_history, e.p3_history
-    _show(row, _ERROR, p2[0] - e.target)
-    _show(row, _TARGET, e.target)
-    _show(row, _SHOWN_P1, e.reading[_P1])
-    _show(row, _SHOWN_P3, p3[0])
-    _show(row, _SHOWN_I, e.reading[_I])
-    _show(row, _ACTION, e.action)
-    _show(row, _WAITED, min(e.waited, LONGEST_WAIT))
-    for k in range(len(P2_LAGS)):
-        _show(row, _P2_CHANGE + k, p2[0] - p2[P2_LAGS[k]])
-    for k in range(len(P3_LAGS)):
-        _show(row, _P3_CHANGE + k, p3[0] - p3[P3_LAGS[k]])
+    waited = min(e.waited, LONGEST_WAIT)
+    write(row, e, e.reading[_P1], e.reading[_I], e.target, e.action, waited)
 
 
 NOISE_BLOCK = 256

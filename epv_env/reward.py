@@ -1,4 +1,4 @@
-"""The reward: the ±500 mbar band of control aim C1, the breakdown of C2, and what control costs."""
+"""The reward: the ±500 mbar band of control aim C1, the pressure dip of C2, and what control costs."""
 
 from dataclasses import dataclass, fields
 from typing import NamedTuple

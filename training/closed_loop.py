@@ -68,7 +68,7 @@ class Kind(NamedTuple):
 
 KINDS = (
     Kind(f"p2 beyond ±{1e3 * BAND_BAR:g} mbar", "% of the time", ".1f", 0.2),
-    Kind("deepest breakdown", "mbar", ".0f", 20.0),
+    Kind("deepest pressure dip", "mbar", ".0f", 20.0),
     Kind("highest overshoot", "mbar", ".0f", 20.0),
     Kind("rms of p2 - target", "mbar", ".0f", 5.0),
     Kind("switchings", "1/s", ".2f", 0.2),

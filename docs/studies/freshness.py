@@ -26,11 +26,12 @@ STUDIES: dict[str, tuple[float, tuple[str, ...]]] = {
     "device": (15, ("study",)),
     "coverage": (20, ("study",)),
     "rare": (20, ("statement --episodes 30000",)),
+    "learning": (60, ("study --seeds 3",)),
     "monitor": (60, ("study",)),
     "blind": (80, ("study --trials 100 --seed 5044", "study --trials 100 --seed 5045 --forms strong")),
     "logs": (90, ("study --valves 60",)),
     "sim_to_real": (120, ("study --seeds 3",)),
-    "comparison": (150, ("study",)),
+    "comparison": (60, ("study",)),
 }
 """Rough minutes on two cores, and the modules that make the published tables, with their options."""
 PACKAGES = ("epv_env", "controllers", "identification", "training")

@@ -16,7 +16,7 @@ from numba import float32, float64, int64
 
 from epv_env.actions import on_off
 from epv_env.device.random import draw_normals, philox
-from epv_env.observation import LAYOUT
+from epv_env.observation import ENTRIES, READINGS, read
 from epv_env.period import begin_period, end_period, observe
 from epv_env.plant.equations import State
 from epv_env.plant.integrate import FORMS, MAX_STEPS, NONE, STEPS, VALVE, WAITING, go_on
@@ -49,8 +49,6 @@ KERNEL = EFFECTS + N_EFFECT
 DELAY_ON, DELAY_OFF, ACTING_U, DELAY_LEFT = range(KERNEL + 1, KERNEL + 5)
 P2, COIL_ENERGY = (State._fields.index(name) for name in ("p2", "coil_energy"))
 """Rows of the table, the state being the first ones."""
-ENTRIES = len(LAYOUT)
-"""Of an observation."""
 
 
 class Batch(NamedTuple):
@@ -274,7 +272,7 @@ def episodes_kernel(
     def run(b, rules, constants, blank, noise, periods, restart, queue, meters, record):
         own, drawn = cuda.local.array(1, memory), cuda.local.array((1, 1, 4), float64)
         figures = cuda.local.array((N_FIGURE, 1), float64)
-        seen = cuda.local.array((1, ENTRIES), float32)
+        seen, readings = cuda.local.array((1, ENTRIES), float32), cuda.local.array(1, READINGS)
         period, settling_time = rules[0].control_period, rules[0].settling_time
         while True:
             i = cuda.atomic.add(queue, 0, 1)
@@ -285,7 +283,8 @@ def episodes_kernel(
             for k in range(periods):
                 if k == 0 or k == restart:
                     own[0] = blank[0]
-                action = decide(own[0], seen[0], constants, period)
+                read(readings[0], seen[0])
+                action = decide(own[0], readings[0], seen[0], constants, period)
                 draw_normals(b.keys[i], 0, 0, k + 1, NOISE, e.noise, drawn[0, 0])
                 for c in range(noise.shape[2]):
                     drawn[0, 0, c] = e.noise * noise[i, k + 1, c]

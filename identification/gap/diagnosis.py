@@ -150,7 +150,7 @@ def diagnose(plant: GreyBox, *, seed: int = 0, cache: FitCache | None = None) ->
     ranking = rank_hypotheses(usable, cache)
     cache.announce("where")
     localisation = _locate(ranking, ranking.recalibrated, seed)
-    cache.announce("how far it shrinks")
+    cache.announce("share closed")
     judged = _judged_causes(ranking)
     nominal = ranking.problem.start(Hypothesis(causes=()), {})
     estimates = {NOMINAL: nominal, RECALIBRATED: ranking.recalibrated.estimate}

@@ -18,7 +18,7 @@ from numba.core.errors import NumbaError
 from numba.extending import register_jitable
 from numpy.typing import NDArray
 
-from identification.gap.fit.laws import KNOTS, MOST_LAWS
+from epv_env.common.law_form import KNOTS, MOST_LAWS
 
 MOST_STEPS = 256
 """Most sub-steps in a sampling period that are tried; a model that needs more is stiff, and an explicit

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from identification.gap.fit.laws import MOST_LAWS
+from epv_env.common.law_form import MOST_LAWS
 from identification.gap.ode_integration import LAW_ROWS, TIME, Job, Records, settled_steps, simulator
 from identification.gap.plant import (
     Cause,

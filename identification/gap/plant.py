@@ -205,7 +205,7 @@ class GreyBox(Protocol):
     without it, a wild sample of an input is refused. `screened` are the faulty readings of a plant that
     has screened its own recordings (`identification.gap.prepare.screened`).
     `law_values(number, cause, argument, low, high, growth)` gives values by symbol [SI] with which
-    `outputs` simulates law `number`, 1 or 2, of a cause: its strength times 1 + g, where g is linear
+    `outputs` simulates law `number`, from 1 on, of a cause: its strength times 1 + g, where g is linear
     between the knots `growth`, equally spaced from `low` to `high` of one of the states in
     `law_arguments`, and constant beyond. Without it, all causes have the laws that are assumed.
     `law_states(values, run)` gives these states as `states` does; without it they are among `states`.

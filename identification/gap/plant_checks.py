@@ -22,6 +22,10 @@ from identification.gap.prepare.screened import sentences
 UNEVEN_PERIOD = 0.01
 """Largest deviation from uniform sampling [sampling periods]: rounding of a logger's clock."""
 
+SILENT, MOVING = 1.5, 10.0
+"""Standard deviation of a silent channel's readings over that of their noise, and least one of the
+nominal model's outputs there [1]."""
+
 
 def check_description(plant: GreyBox) -> None:
     """Look for mistakes in the description of a plant and in the form of its recordings.
@@ -39,8 +43,8 @@ def check(plant: GreyBox) -> list[str]:
     cause is tried once, on as few runs as show its effect.
 
     Returns:
-        Warnings, a sentence each: faulty readings, parameters and causes without effect, parameters that
-        act alike.
+        Warnings, a sentence each: faulty readings, channels that show nothing but noise, parameters and
+        causes without effect, parameters that act alike.
 
     Raises:
         PlantError: every finding is one line that names the member, the rule and the remedy.
@@ -49,7 +53,7 @@ def check(plant: GreyBox) -> list[str]:
     usable = prepared(plant)
     _refuse(_output_faults(usable))
     _refuse(_shape_faults(usable))
-    return [*sentences(usable.screened), *_effect_warnings(usable)]
+    return [*sentences(usable.screened), *_silent_channels(usable), *_effect_warnings(usable)]
 
 
 def _refuse(faults: Iterable[str]) -> None:
@@ -288,6 +292,25 @@ def _shape_faults(plant: GreyBox) -> Iterator[str]:
         shape = np.shape(plant.forced(values, run, forcing))
         if shape != expected:
             yield f"forced: equation {equation.name} has the shape {shape}, not {expected}"
+
+
+def _silent_channels(plant: GreyBox) -> Iterator[str]:
+    """Channels that show their noise about one value in all runs, although the nominal model moves."""
+    outputs = [run[..., 0] for run in _simulated(plant, [{}])]
+    readings = [run.measured for run in plant.runs]
+    for c, channel in enumerate(plant.channels):
+        measured, modelled = (
+            np.concatenate([own[c, run.trusted[c]] for own, run in zip(values, plant.runs, strict=True)])
+            for values in (readings, outputs)
+        )
+        noise = channel.known_noise
+        if len(measured) and np.std(measured) < SILENT * noise and np.std(modelled) > MOVING * noise:
+            value = np.mean(measured) / channel.scale
+            yield (
+                f"{channel.name} shows nothing but noise about {value:.4g} {channel.unit} in all "
+                "recordings, where the model moves: its sensor is dead, or what it measures does not "
+                "move; look before a cause is believed"
+            )
 
 
 def _magnitudes(outputs: NDArray) -> NDArray:

@@ -83,9 +83,13 @@ def next_recording(
     """
     if verdict == UNKNOWN or not ranking.hypotheses:
         return NextRecording(text=NOTHING_EXPLAINS)
-    answers = [hypothesis.estimate for hypothesis in (*ranking.hypotheses, ranking.recalibrated)]
-    pairs = zip((*ranking.probabilities, ranking.no_cause), answers, strict=True)
-    (probability, first), (_, second) = sorted(pairs, key=lambda pair: -pair[0])[:2]
+    answers: dict[frozenset[str], tuple[float, Estimate]] = {}  # a set's laws are no other answer
+    probabilities = (*ranking.probabilities, ranking.no_cause)
+    for each, own in zip((*ranking.hypotheses, ranking.recalibrated), probabilities, strict=True):
+        labels = frozenset(each.estimate.hypothesis.labels)
+        before, estimate = answers.get(labels, (0.0, each.estimate))
+        answers[labels] = before + own, estimate
+    (probability, first), (_, second) = sorted(answers.values(), key=lambda answer: -answer[0])[:2]
     one, other = (
         " + ".join(cause.title for cause in answer.hypothesis.causes) or "no cause"
         for answer in (first, second)

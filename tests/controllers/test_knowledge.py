@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from controllers.knowledge import (
-    READINGS,
+    INPUTS,
     LearntObservation,
     ValveKnowledge,
     above_band,
@@ -16,8 +16,8 @@ from controllers.knowledge import (
 )
 from controllers.pulse import AdaptivePulse
 from controllers.tuned import tuned
-from controllers.valve_learner import LEARNT, VALVE
-from epv_env.observation import LAYOUT, encode
+from controllers.valve_learner import VALVE
+from epv_env.observation import ENTRIES, LAYOUT, encode
 from epv_env.plant.plantfile import Plant
 from training.evaluation.rollout import run_episodes
 
@@ -107,22 +107,22 @@ def actions(n: int, periods: int) -> np.ndarray:
 
 def test_a_wrapped_environment_shows_what_a_controller_knows():
     env = observing("Disabled", max_episode_steps=None)
-    assert env.single_observation_space.shape == (READINGS + len(LEARNT),)
+    assert env.single_observation_space.shape == (INPUTS,)
     knowledge = ValveKnowledge(PLANT)
     knowledge.reset(4)
     observation, _ = env.reset(seed=3)
     for action in actions(4, 60):
-        expected = knowledge.observe(observation[:, :READINGS])
+        expected = knowledge.observe(observation[:, :ENTRIES])
         np.testing.assert_array_equal(observation, expected)
         observation = env.step(action)[0]
-    assert np.ptp(observation[:, READINGS:], axis=0).max() > 0
+    assert np.ptp(observation[:, ENTRIES:], axis=0).max() > 0
 
 
 @pytest.mark.parametrize("mode", ["SameStep", "NextStep"])
 def test_an_episode_begins_with_an_unknown_valve_in_every_autoreset_mode(mode):
     env = observing(mode, max_episode_steps=20)
     observation, _ = env.reset(seed=3)
-    unknown = observation[:, READINGS + 1].copy()  # the deviation of the opening pressure
+    unknown = observation[:, ENTRIES + 1].copy()  # the deviation of the opening pressure
     ends = []
     for action in actions(4, 42):
         observation, _, _, truncated, infos = env.step(action)
@@ -135,8 +135,8 @@ def test_an_episode_begins_with_an_unknown_valve_in_every_autoreset_mode(mode):
     for k, action in enumerate(actions(4, 42)):
         shown = env.step(action)[0]
         if k == fresh:
-            np.testing.assert_allclose(shown[:, READINGS + 1], unknown)
-            assert np.all(shown[:, READINGS + 16] <= 4.0)
+            np.testing.assert_allclose(shown[:, ENTRIES + 1], unknown)
+            assert np.all(shown[:, ENTRIES + 16] <= 4.0)
 
 
 def test_advice_is_that_of_the_adaptive_pulse():
@@ -146,7 +146,7 @@ def test_advice_is_that_of_the_adaptive_pulse():
     pulse.reset(4)
     knowledge.reset(4)
     for _ in range(100):
-        advised = pulse.act(observation[:, :READINGS])
-        shown = knowledge.observe(observation[:, :READINGS])[:, -1]
+        advised = pulse.act(observation[:, :ENTRIES])
+        shown = knowledge.observe(observation[:, :ENTRIES])[:, -1]
         np.testing.assert_array_equal(shown, 2 * advised - 1)
         observation = env.step(advised)[0]

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("safetensors")
 from safetensors.numpy import load_file, save_file
 
-from controllers.knowledge import READINGS
+from controllers.knowledge import INPUTS
 from controllers.network import Network
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE, PolicyError, read_policy, write_policy
@@ -17,7 +17,6 @@ from controllers.valve_learner import LEARNT
 from training.evaluation.rollout import run_episodes
 
 pytestmark = pytest.mark.training
-INPUTS = READINGS + len(LEARNT)
 
 
 def layer(rng: np.random.Generator, inputs: int, outputs: int):

@@ -8,7 +8,7 @@ import pytest
 from controllers.hysteresis import Hysteresis
 from controllers.sensor_check import HELD, SENSES, checked, ends_of, overruled
 from controllers.tuned import tuned
-from epv_env.observation import LAYOUT, decode, encode
+from epv_env.observation import LAYOUT, READINGS, decode, encode, read
 from epv_env.plant.channels import SENSORS
 from epv_env.plant.plantfile import Plant
 
@@ -30,8 +30,9 @@ class Check:
             self.act(seen())
 
     def act(self, observation) -> float:
-        self.shown = observation.copy()
-        checked(self.senses, self.shown, ENDS, self.fallback, PERIOD)
+        self.shown, readings = observation.copy(), np.zeros(1, READINGS)[0]
+        read(readings, self.shown)
+        checked(self.senses, readings, self.shown, ENDS, self.fallback, PERIOD)
         return overruled(self.senses, 0.0)
 
 

@@ -16,6 +16,7 @@ from controllers.valve_learner import (
     VALVE,
 )
 from epv_env.common.units import BAR
+from epv_env.observation import ENTRIES, READINGS, read
 from epv_env.plant.plantfile import Plant
 from epv_env.plant.simulate import energised
 from epv_env.plant.valves import Valves
@@ -125,7 +126,8 @@ def test_the_reserve_is_what_the_hardest_application_draws_beyond_what_is_tolera
     assert table.hardest_fall[0] * (table.release_lag[0] + rest) == pytest.approx(fell, rel=0.03)
 
     slow = table._replace(vent_rate=table.vent_rate / 10)
-    (known,) = np.zeros(1, VALVE)
-    valve_learner.observe(known, slow, 0, np.zeros(13), 5e-3, FILTER_TIME, False)
+    (known,), (readings,) = np.zeros(1, VALVE), np.zeros(1, READINGS)
+    read(readings, np.zeros(ENTRIES))
+    valve_learner.observe(known, slow, 0, readings, 5e-3, FILTER_TIME, False)
     assert known["reserve"] == MOST_RESERVE
     assert table.hardest_fall[0] * known["opens_from_rest"] > TOLERATED

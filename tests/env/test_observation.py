@@ -1,10 +1,25 @@
 """The observation is a float32 contract of measured, normalised, noisy readings and nothing else."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from gymnasium.vector import AutoresetMode
 
-from epv_env.observation import INDEX, LAYOUT, P2_LAGS, decode, encode, observation_space
+from epv_env.observation import (
+    ENTRIES,
+    HISTORY,
+    INDEX,
+    LAYOUT,
+    P2_LAGS,
+    P3_LAGS,
+    READINGS,
+    decode,
+    encode,
+    observation_space,
+    read,
+    write,
+)
 from epv_env.plant.channels import SENSORS
 from epv_env.plant.parameters import table
 from tests.env.rollouts import actions, native, run
@@ -142,3 +157,19 @@ def test_decode_undoes_encode(name):
     )
     others = np.delete(observations, INDEX[name], axis=1)
     np.testing.assert_array_equal(others, 0.0)
+
+
+def test_a_record_of_readings_is_the_observation_in_its_units_and_is_written_as_it_was_read() -> None:
+    seen = np.random.default_rng(0).uniform(-0.5, 0.5, ENTRIES).astype(np.float32)
+    r = np.zeros(1, READINGS)[0]
+    read(r, seen)
+    names = ("p2_error", "target", "p1", "p3", "I", "action", "since_switching")
+    fields = ("error", "target", "p1", "p3", "current", "coil", "waited")
+    assert [r[field] for field in fields] == pytest.approx([decode(seen, name) for name in names])
+    assert r.p2 == r.error + r.target
+    past = SimpleNamespace(p2_history=np.full(HISTORY, r.p2), p3_history=np.full(HISTORY, r.p3))
+    past.p2_history[list(P2_LAGS)] -= r.p2_change
+    past.p3_history[list(P3_LAGS)] -= r.p3_change
+    again = np.zeros(ENTRIES)
+    write(again, past, r.p1, r.current, r.target, r.coil, r.waited)
+    np.testing.assert_allclose(again, seen, rtol=0, atol=1e-6)

@@ -5,7 +5,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epv_env.plant.effects.law import KNOTS, placed
+from epv_env.common.law_form import KNOTS
+from epv_env.plant.effects.law import placed
 from epv_env.plant.effects.registry import PLACES
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters

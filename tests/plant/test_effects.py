@@ -5,12 +5,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad, simpson, solve_ivp
 
+from epv_env.common.law_form import KNOTS
 from epv_env.plant.channels import readings
 from epv_env.plant.coefficients import coefficients
 from epv_env.plant.effects.chambers import chamber_rates
 from epv_env.plant.effects.coil import COOLING_TIME, COPPER
 from epv_env.plant.effects.flows import FILLING_TIME
-from epv_env.plant.effects.law import KNOTS, placed
+from epv_env.plant.effects.law import placed
 from epv_env.plant.effects.movers import STRIBECK_SPEED, stribeck
 from epv_env.plant.effects.registry import CATALOGUE, PLACES, Effects, effect_constants, kernel_of
 from epv_env.plant.equations import (

@@ -7,8 +7,9 @@ import gymnasium as gym
 import numpy as np
 import pytest
 
+from epv_env.common.law_form import KNOTS
 from epv_env.plant.channels import readings
-from epv_env.plant.effects.law import ARGUMENTS, KNOTS, SLOTS, Law, Terms, growth, laws_of, placed
+from epv_env.plant.effects.law import ARGUMENTS, SLOTS, Law, Terms, growth, laws_of, placed
 from epv_env.plant.effects.registry import PLACES, Effects, effect, effect_constants, with_laws
 from epv_env.plant.equations import State
 from epv_env.plant.parameters import Parameters

@@ -11,13 +11,14 @@ import numpy as np
 import pytest
 
 from controllers.hysteresis import Hysteresis
+from controllers.knowledge import INPUTS
 from controllers.network import Network
 from controllers.policy_files import write_policy
 from epv_env.common.commands import main_of
-from epv_env.observation import LAYOUT
+from epv_env.observation import ENTRIES
 from training.deploy.agreement import STATES_EPISODES as EPISODES
 from training.deploy.agreement import STATES_PERIODS as PERIODS
-from training.deploy.c_code import INPUTS, MEMORY
+from training.deploy.c_code import MEMORY
 from training.deploy.compiled import READINGS, READINGS_TYPE, library, logits_of
 
 GOOD = Hysteresis(open_below=-0.1, shut_above=0.0, shut_lookahead=0.03, name="good")
@@ -103,7 +104,7 @@ def replay(folder: Path, network: Network) -> Replay:
     exact = replace(network, layers=layers).logits(rows)
     return Replay(
         agreed=int(np.sum(decided == wanted.ravel())),
-        observation_error=float(np.abs(made - rows)[:, : len(LAYOUT)].max()),
+        observation_error=float(np.abs(made - rows)[:, :ENTRIES].max()),
         margin_error=float(np.abs(np.diff(logits_of(code, rows) - exact)).max()),
     )
 

@@ -92,7 +92,7 @@ def test_differences_are_paired_and_have_a_sign(results):
     both = [results["calibrated", "steps", name].rms_bar for name in ("good", "late")]
     assert row["difference"] == pytest.approx(1e3 * np.mean(both[0] - both[1]))
     assert row["low"] < row["difference"] < row["high"] < 0
-    assert table.loc[("calibrated", "share that leaves [%]"), "difference"] < 0
+    assert table.loc[("calibrated", "violation rate [%]"), "difference"] < 0
 
 
 def command(*arguments):

@@ -132,7 +132,7 @@ def test_nothing_in_it_is_undefined(any_copy, tmp_path):
     [
         ("epv_policy.c", r"(BIAS_0\[\d+\] = \{\s*)[^,]+,", r"\g<1>3.0f,"),
         ("epv_learner.h", r"10395\.0f\)", "10394.0f)"),
-        ("epv_learner.h", r"(SENSOR_CHECK_P2_LAGS\[\d+\] = \{\s*1\.0f, 2\.0f, )4", r"\g<1>3"),
+        ("epv_learner.h", r"(OBSERVATION_P2_LAGS\[\d+\] = \{\s*1\.0f, 2\.0f, )4", r"\g<1>3"),
         ("epv_policy.c", r"m->waited = 1;", "m->waited = 0;"),
         ("epv_learner.h", r"/ v->pace\)", "/ (1.02f * v->pace))"),
         ("epv_learner.h", r"v->gain \* fn_gained_at_once", "2.0f * v->gain * fn_gained_at_once"),

@@ -156,7 +156,7 @@ int main(void)
             epv_policy_step(&other, &held);
             if (m.senses.fallback != other.senses.fallback)
                 return 3;
-            if (m.senses.now[1] - m.senses.now[4] < 0.499f && coil != (int)m.senses.fallback)
+            if (m.senses.last[1] - m.senses.last[4] < 0.499f && coil != (int)m.senses.fallback)
                 return 4;
         }
     }

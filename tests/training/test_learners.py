@@ -15,10 +15,10 @@ import pytest
 pytest.importorskip("stable_baselines3")
 import torch
 
-from controllers.knowledge import READINGS
+from controllers.knowledge import INPUTS
 from controllers.policy import load_policy
 from controllers.policy_files import read_policy, write_policy
-from controllers.valve_learner import LEARNT
+from epv_env.observation import ENTRIES
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import Options, next_step, sentence_of, verdict
@@ -42,7 +42,7 @@ def env():
 
 def test_the_written_network_is_the_actor_that_is_trained_and_begins_with_the_advice(env):
     model = make_model(env, seed=3)
-    inputs = np.random.default_rng(0).normal(size=(200, READINGS + len(LEARNT))).astype("f4")
+    inputs = np.random.default_rng(0).normal(size=(200, INPUTS)).astype("f4")
     with torch.no_grad():
         distribution: Any = model.policy.get_distribution(torch.from_numpy(inputs)).distribution
     expected = distribution.logits.numpy()
@@ -121,7 +121,7 @@ def test_a_stopped_training_ends_with_the_same_policy(tmp_path: Path, monkeypatc
     assert read_policy(whole)[0].provenance["timesteps"] == best["timesteps"]
     policy = load_policy(whole)
     policy.reset(2)
-    assert set(policy.act(np.zeros((2, READINGS)))) <= {0, 1}
+    assert set(policy.act(np.zeros((2, ENTRIES)))) <= {0, 1}
 
 
 def test_seeds_are_ranked_by_violations_then_return_and_none_is_trained_twice(tmp_path, monkeypatch):
@@ -151,7 +151,7 @@ def test_seeds_are_ranked_by_violations_then_return_and_none_is_trained_twice(tm
     [(1.0, 3.0, "is better than"), (-3.0, -1.0, "is worse than"), (-1.0, 1.0, "cannot be told from")],
 )
 def test_the_verdict_says_what_the_interval_allows(low, high, words):
-    scores = ["return", "share that leaves [%]", "switchings [1/s]"]
+    scores = ["return", "violation rate [%]", "switchings [1/s]"]
     paired = pd.DataFrame(
         {"controller": "PPO", "score": scores, "difference": 0.5, "low": low, "high": high}
     )

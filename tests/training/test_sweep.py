@@ -60,7 +60,7 @@ def test_a_change_hurts_if_its_interval_lies_above_the_nominal_one():
     found = harmful_changes(points)
     assert found.to_dict("records") == [
         {"controller": "c", "changed": "parameters", "tried": 2, "hurt": 1,
-         "most [% leave]": "R +10 % (20)"}
+         "highest violation rate [%]": "R +10 % (20)"}
     ]  # fmt: skip
 
 

@@ -276,7 +276,7 @@ def gap_table(results: Results) -> pd.DataFrame:
 def share_picture(
     shares: pd.DataFrame, marks: Mapping[str, tuple[str, str, float]], *, title: str = ""
 ) -> Figure:
-    """Episodes that leave the band [%]: a line for each row, a mark for each column.
+    """Violation rates [%]: a line for each row, a mark for each column.
 
     marks: marker, its inside's colour and its size [points], by column of `shares`. title: of the marks.
     """
@@ -285,7 +285,7 @@ def share_picture(
     for name, (marker, inside, size) in marks.items():
         axes.plot(shares[name], places, marker, label=name, mfc=inside, mec="black", ms=size)
     axes.set_yticks(places, list(shares.index))
-    axes.set(xlabel="episodes that leave ±500 mbar [%]", xlim=(-2, None))
+    axes.set(xlabel="violation rate [%]", xlim=(-2, None))
     axes.set_ylim(len(shares) - 0.5, -0.5)
     axes.grid(alpha=0.3)
     drawn.legend(title=title, ncols=5, loc="outside upper center", frameon=False)

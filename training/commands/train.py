@@ -87,7 +87,7 @@ class Options:
     parameters: Annotated[str, {"choices": (*REGIONS, DIAGNOSIS)}, "plants to train on"] = REGION
     switching_price: Annotated[
         float, Number(float, 0.0, 1000.0),
-        "reward's price of one switching of the coil: trades wear against breakdown",
+        "reward's price of one switching of the coil: trades wear against pressure dips",
     ] = RewardWeights().switching  # fmt: skip
     resume: Annotated[bool, AGAIN, "go on from the folder's checkpoint"] = False
     force: Annotated[bool, AGAIN, "begin anew in a folder that holds a training already"] = False
@@ -227,7 +227,7 @@ def sentence_of(paired: pd.DataFrame, options: Options) -> str:
     """
     mine = paired[paired["controller"] == "PPO"].set_index("score")
     gain = mine.loc["return"]
-    left, switchings = mine.loc["share that leaves [%]"], mine.loc["switchings [1/s]"]
+    left, switchings = mine.loc["violation rate [%]"], mine.loc["switchings [1/s]"]
     if gain["low"] > 0:
         judged = "is better than"
     elif gain["high"] < 0:
@@ -238,7 +238,7 @@ def sentence_of(paired: pd.DataFrame, options: Options) -> str:
         f"The policy {judged} the {RIVAL!r} controller on {options.episodes} unseen episodes "
         f"(plants: {in_words(options.parameters)}): "
         f"return {gain['difference']:+.3g} ({gain['low']:+.3g} to {gain['high']:+.3g}), "
-        f"{left['difference']:+.2g} % of the episodes leave the band, "
+        f"violation rate {left['difference']:+.2g} percentage points, "
         f"{switchings['difference']:+.2g} switchings a second."
     )
 
@@ -249,7 +249,7 @@ def learning_curve(validations: list[dict[str, float]]) -> Any:
     steps = [row["timesteps"] / 1e6 for row in validations]
     axes.plot(steps, [row["score"] for row in validations], "o-")
     for row, step in zip(validations, steps, strict=True):
-        left = f"{row['left']:.0f} of {row['episodes']:.0f} leave"
+        left = f"{row['left']:.0f} of {row['episodes']:.0f} violate"
         axes.annotate(
             left, (step, row["score"]), xytext=(0, 8), textcoords="offset points", ha="center",
             fontsize=8, bbox={"facecolor": "white", "edgecolor": "none", "pad": 1},

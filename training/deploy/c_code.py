@@ -14,15 +14,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from controllers import knowledge, network, pulse, sensor_check, valve_learner
-from controllers.knowledge import RULES, SHIELDS
+from controllers.knowledge import INPUTS, RULES, SHIELDS
 from controllers.policy import Policy
 from controllers.policy_files import learnt_contract
-from controllers.valve_learner import LEARNT
-from epv_env.observation import HISTORY, INDEX, LAYOUT, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
+from epv_env import observation
+from epv_env.observation import ENTRIES, HISTORY, LONGEST_WAIT, P2_LAGS, P3_LAGS, contract
 from training.deploy.controller_c import (
-    ARRAY,
     PLANT,
+    READINGS,
     REAL,
+    ROW,
     SENSES,
     VALVE,
     ControllerC,
@@ -35,8 +36,6 @@ TITLE = "Pressure limiting by an electro-pneumatic protection valve: a trained p
 FORMAT = "epv-deployment/2"
 CODE = ("epv_policy.h", "epv_policy.c", "epv_learner.h")
 """Files that hold the controller."""
-INPUTS = len(LAYOUT) + len(LEARNT)
-"""Inputs of the network: readings and learnt quantities."""
 
 LEAST_AGREEMENT = 0.9999
 """Share of the states on which the code must decide as Python: single precision may pass a threshold."""
@@ -92,17 +91,17 @@ def controller_c(export: Export) -> ControllerC:
         "thresholds": parts.fallback._asdict(),
     }
     shapes = {4: table["gain"].shape[1:]}
-    c = ControllerC(constants=constants, shapes=shapes, indices=("t",), records=RECORDS)
-    c.function(sensor_check.hold, (SENSES, ARRAY, PLANT, REAL))
+    records = RECORDS | {READINGS: observation.READINGS}
+    c = ControllerC(constants=constants, shapes=shapes, indices=("t",), records=records)
+    c.texts.append(c.structure(READINGS))
+    c.function(sensor_check.hold, (SENSES, READINGS, PLANT, REAL))
     c.function(sensor_check.remember, (SENSES,))
-    c.function(sensor_check.show, (SENSES, ARRAY))
-    c.function(sensor_check.watch, (SENSES, ARRAY, PLANT, REAL))
+    c.function(sensor_check.show, (SENSES, READINGS, ROW))
+    c.function(sensor_check.watch, (SENSES, READINGS, PLANT, REAL))
     c.function(sensor_check.overruled, (SENSES, REAL))
-    c.function(valve_learner.observe, (VALVE, PLANT, PLANT, ARRAY, REAL, REAL, REAL))
+    c.function(valve_learner.observe, (VALVE, PLANT, PLANT, READINGS, REAL, REAL, REAL))
     c.function(pulse.plan, (VALVE, PLANT, PLANT, PLANT, REAL))
-    c.function(knowledge.shown, (REAL, REAL))
-    c.function(knowledge.keeps_on, (VALVE,))
-    c.function(knowledge.above_band, (REAL,))
+    c.function(knowledge.show_learnt, (VALVE, ROW))
     c.function(knowledge.forced, (VALVE, REAL))
     c.function(network.tangent, (REAL,))
     return c
@@ -111,14 +110,10 @@ def controller_c(export: Export) -> ControllerC:
 def sources(export: Export) -> dict[str, str]:
     """The text of each file of CODE."""
     layers, c = export.layers, controller_c(export)
-    learnt = "\n".join(
-        f"    inputs[{len(LAYOUT) + k}] = fn_shown(m->valve.{entry.name}, {k});"
-        for k, entry in enumerate(LEARNT)
-    )
     fields: dict[str, Any] = {
         "title": TITLE,
         "source": f"Weights with SHA-256 {export.weights_sha256}.",
-        "readings": len(LAYOUT),
+        "entries": ENTRIES,
         "inputs": INPUTS,
         "period_us": round(export.period * 1e6),
         "period": literal(export.period),
@@ -126,10 +121,6 @@ def sources(export: Export) -> dict[str, str]:
         "longest_wait": ceil(LONGEST_WAIT / export.period - 1e-9),
         "layers": len(layers),
         "widest": export.widest,
-        "action": INDEX["action"],
-        "error": INDEX["p2_error"],
-        "since": INDEX["since_switching"],
-        "learnt": learnt,
         "records": "\n".join(map(c.structure, RECORDS)),
         "advice": listed(export.policy.network.advice_weight),
         "filter_time": literal(valve_learner.FILTER_TIME),
@@ -196,6 +187,6 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         "bytes": {
             "constants": 4 * (sum(map(sum, sizes)) + table),
             "memory_of_a_valve": MEMORY.itemsize,
-            "buffers_on_the_stack": 4 * (2 * export.widest + INPUTS + len(LAYOUT)),
+            "buffers_on_the_stack": 4 * (2 * export.widest + INPUTS + ENTRIES),
         },
     }

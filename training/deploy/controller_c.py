@@ -29,9 +29,11 @@ static real squared(real a) { return a * a; }
 MOST = 1e38
 """Largest constant in single precision: what is larger stands for no limit."""
 
-REAL, VALVE, SENSES, PLANT, ARRAY = "real", "epv_valve", "epv_senses", "plant", "array"
-"""Kinds of arguments: a number, the two records of a valve, what is constant in C, and an array with its
-length."""
+REAL, ROW, PLANT, ARRAY = "real", "real *", "plant", "array"
+"""Kinds of arguments: a number, an observation or inputs of a network, what is constant in C, and a
+constant array with its length."""
+VALVE, SENSES, READINGS = "epv_valve", "epv_senses", "epv_readings"
+"""The same: records, passed by their address."""
 
 
 def listed(values: NDArray) -> str:
@@ -90,26 +92,18 @@ class _Body(Body):
     PREFIX = "fn_"
     MATHEMATICS = {  # noqa: RUF012
         math.exp: "expf", math.log: "logf", math.sqrt: "sqrtf", np.log: "logf", np.sqrt: "sqrtf",
-        np.exp: "expf", abs: "fabsf", min: "lesser", max: "greater",
+        np.exp: "expf", abs: "fabsf", min: "lesser", max: "greater", np.minimum: "lesser",
+        np.maximum: "greater",
     }  # fmt: skip
 
     def declared(self, name: str) -> list[str]:
         """A valve by its address, an array with its length; constants are not passed."""
         kind = self.given[name]
         if kind == ARRAY:
-            return [f"{'' if self.writes(name) else 'const '}real *{name}", f"int {name}_n"]
+            return [f"const real *{name}", f"int {name}_n"]
         if kind in self.c.records:
             return [f"{kind} *{name}"]
         return [] if kind == PLANT else [f"{kind} {name}"]
-
-    def writes(self, name: str) -> bool:
-        """Whether the function writes into an array."""
-        return any(
-            isinstance(node, ast.Subscript)
-            and isinstance(node.ctx, ast.Store)
-            and ast.unparse(node.value) == name
-            for node in ast.walk(self.tree)
-        )
 
     def held(self, kind: str) -> str:
         """Whole numbers are held in a real."""
@@ -133,6 +127,8 @@ class _Body(Body):
         """C of a number, or the name of a constant array, which is defined at the top of the file."""
         if isinstance(value, np.number):
             value = float(value)
+        if isinstance(value, tuple):
+            value = np.array(value)
         if not isinstance(value, np.ndarray):
             return super().constant(node, value)
         known = [name for name, own in self.c.arrays.items() if own is value]
@@ -160,7 +156,7 @@ class _Body(Body):
         """C of an entry of an array."""
         places = index.elts if isinstance(index, ast.Tuple) else [index]
         places = [p for p in places if ast.unparse(p) not in self.c.indices]
-        if isinstance(holder, ast.Name) and self.given.get(holder.id) == ARRAY:
+        if isinstance(holder, ast.Name) and self.given.get(holder.id) in (ARRAY, ROW):
             base, shape = holder.id, self.c.shapes.get(len(places), ())
         elif (
             isinstance(holder, ast.Attribute)

@@ -2,8 +2,8 @@
 
 C1  p2 stays within target ±500 mbar after the settling time: constraint violation rate, worst
     excursion, and the excursion that 99.9 % of the episodes do not exceed.
-C2  p2 breaks down little when air is drawn, and recovers soon: breakdown and recovery of every
-    consumption event, largest shortfall of the episode.
+C2  p2 falls little when air is drawn, and recovers soon: pressure dip (`breakdown`) and recovery of
+    every consumption event, largest shortfall of the episode.
 C3  the same figures on plants drawn from a region.
 Cost: switchings of the coil, air vented, coil energy.
 """
@@ -27,7 +27,7 @@ TAIL_SHARE = 0.999
 
 
 SHORTFALL_BAR = BAND_BAR / 2
-"""Shortfall below the target from which a breakdown counts as not yet recovered [bar]."""
+"""Shortfall below the target from which a pressure dip counts as not yet recovered [bar]."""
 EVENT_FLOW = 0.9
 """Consumption above which a period belongs to an application [g/s]; the largest leak lies below."""
 ONSET = 0.5
@@ -81,10 +81,10 @@ def _follow_events(m, consuming, shortfall, period):
     """Take in whether a period belongs to an application, and its largest shortfall [bar].
 
     An event begins with the period in which consumption rises above EVENT_FLOW. It ends where the next
-    one begins, or AFTERMATH after consumption has fallen below again, or with the episode. Its breakdown
-    is the largest shortfall in that time. Its recovery is the time from its beginning until p2 is back
-    above target - SHORTFALL_BAR after the first dip below, or to the event's end if that comes first;
-    0 if no dip begins within ONSET.
+    one begins, or AFTERMATH after consumption has fallen below again, or with the episode. Its pressure
+    dip is the largest shortfall in that time. Its recovery is the time from its beginning until p2 is
+    back above target - SHORTFALL_BAR after the first dip below, or to the event's end if that comes
+    first; 0 if no dip begins within ONSET.
     """
     if consuming and m.consuming == 0.0:
         _end_event(m)
@@ -143,7 +143,7 @@ class EpisodeMetrics:
     events: NDArray
     """C2: number of consumption events."""
     event_breakdown_bar: NDArray
-    """C2: breakdown of an event, mean over the episode's events; 0 without any."""
+    """C2: pressure dip of an event, mean over the episode's events; 0 without any."""
     event_recovery_s: NDArray
     """C2: recovery of an event, mean over the episode's events; 0 without any."""
     longest_event_recovery_s: NDArray

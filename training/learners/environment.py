@@ -1,9 +1,10 @@
 """The episodes that PPO trains on: drawn plants, hard applications, a narrower band."""
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import gymnasium
-from gymnasium.vector import AutoresetMode
+from gymnasium.vector import AutoresetMode, VectorEnv
 from stable_baselines3.common.vec_env import VecEnv, VecEnvWrapper, VecMonitor
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvObs, VecEnvStepReturn
 
@@ -29,8 +30,8 @@ REWARD_SCALE = 0.08
 """Factor of the rewards that PPO sees [1]: the critic's errors become about as large as the actor's
 advantages, whose gradients PPO clips together."""
 FACTORS = {"band": 2.0, "tracking": 1.2, "breakdown": 1.4, "switching": 2.0}
-"""Prices of the training, relative to the reward's: with the reward's own, less error and breakdown
-would be bought by more switchings, and rare violations would hardly count."""
+"""Prices of the training, relative to the reward's: with the reward's own, smaller errors and
+pressure dips would be bought by more switchings, and rare violations would hardly count."""
 BAND_BAR = 0.3
 """Half-width of the band that is priced in training [bar]: the policy keeps a margin."""
 
@@ -54,6 +55,11 @@ def training_weights(weights: RewardWeights) -> RewardWeights:
     return replace(weights, band_bar=min(weights.band_bar, BAND_BAR), **raised)
 
 
+def with_rules(env: VectorEnv) -> VectorEnv:
+    """The environment behind the rules; the learnt quantities are observed, too."""
+    return LearntObservation(env, rules=True)
+
+
 def make_training_env(
     *,
     plant: Plant,
@@ -61,8 +67,9 @@ def make_training_env(
     scenario: str = "mixed",
     parameters: str | Region | Mixture = "sensitive_ten_percent",
     weights: RewardWeights,
+    wrap: Callable[[VectorEnv], VectorEnv] = with_rules,
 ) -> VecEnv:
-    """Episodes on drawn plants, the learnt quantities among the observations, the rules in front.
+    """Episodes on drawn plants.
 
     Args:
         plant: centre of the region.
@@ -70,6 +77,7 @@ def make_training_env(
         scenario: of the consumption.
         parameters: region that plants are drawn from, or its name.
         weights: prices of the reward.
+        wrap: what stands between the environment and the algorithm.
     """
     lengths = range(SHORTEST, LONGEST + 1, ROLLOUT)
     env = gymnasium.make_vec(
@@ -84,4 +92,4 @@ def make_training_env(
         conditions=CONDITIONS,
         weights=training_weights(weights),
     )
-    return ScaledReward(VecMonitor(SB3VectorEnv(LearntObservation(env, rules=True))))
+    return ScaledReward(VecMonitor(SB3VectorEnv(wrap(env))))

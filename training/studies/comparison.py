@@ -28,25 +28,25 @@ Results = dict[tuple[str, str, str], EpisodeMetrics]
 """Episodes by plant set, scenario and controller."""
 
 SCORES = {
-    "stayed": "share that leaves [%]",
+    "stayed": "violation rate [%]",
     "rms_bar": "rms error [mbar]",
-    "event_breakdown_bar": "breakdown per event [mbar]",
+    "event_breakdown_bar": "pressure dip [mbar]",
     "switchings_per_s": "switchings [1/s]",
     "episode_return": "return",
 }
 """Fields of EpisodeMetrics that are compared in pairs."""
 
 FACTORS = {"stayed": -100.0, "rms_bar": 1e3, "event_breakdown_bar": 1e3}
-"""From a score to the unit of its heading; "stayed" becomes the share that leaves."""
+"""From a score to the unit of its heading; "stayed" becomes the violation rate."""
 
 COLUMNS = {
     "plants": "plants",
     "scenario": "scenario",
     "controller": "controller",
-    "left_percent": "leaves [%]",
-    "C1_worst_excursion_bar": "worst [bar]",
-    "rms_error_mbar": "rms [mbar]",
-    "C2_event_breakdown_mbar": "breakdown [mbar]",
+    "left_percent": "violation rate [%]",
+    "C1_worst_excursion_bar": "worst excursion [bar]",
+    "rms_error_mbar": "rms error [mbar]",
+    "C2_event_breakdown_mbar": "pressure dip [mbar]",
     "switchings_per_s": "switchings [1/s]",
     "mean_return": "return",
 }
@@ -163,8 +163,8 @@ def as_text(table: pd.DataFrame) -> str:
 
 
 PANELS = {
-    "left_percent": "episodes that leave\n±500 mbar [%]",
-    "C2_event_breakdown_mbar": "breakdown per\nevent [mbar]",
+    "left_percent": "violation rate\n[%]",
+    "C2_event_breakdown_mbar": "pressure dip\n[mbar]",
     "switchings_per_s": "switchings\n[1/s]",
 }
 """What the picture shows, by column of `rows`."""
@@ -173,7 +173,7 @@ PANELS = {
 def figure(table: pd.DataFrame) -> Figure:
     """A line for each controller and a panel for each of PANELS. table: `rows` of one cell each.
 
-    Bars are exact 95 % intervals of the share that leaves.
+    Bars are exact 95 % intervals of the violation rate.
     """
     names = list(table["controller"])
     drawn, panels = plt.subplots(

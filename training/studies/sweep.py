@@ -1,4 +1,4 @@
-"""A sweep: one thing changed at a time, and regions; tables of the shares that leave the band."""
+"""A sweep: one thing changed at a time, and regions; tables of violation rates."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
@@ -134,9 +134,9 @@ RANGE_ENDS = ("least", "greatest", "top")
 HEADINGS = {
     "level": "plants",
     "controller": "controller",
-    "left_text": "leaves [%]",
-    "C1_worst_excursion_bar": "worst [bar]",
-    "rms_error_bar": "rms [bar]",
+    "left_text": "violation rate [%]",
+    "C1_worst_excursion_bar": "worst excursion [bar]",
+    "rms_error_bar": "rms error [bar]",
     "switchings_per_s": "switchings [1/s]",
 }
 """Columns of the table of regions."""
@@ -150,7 +150,7 @@ def point_table(
 ) -> pd.DataFrame:
     """A row for each point and controller.
 
-    Columns: design, factor, level, controller; `left`, the share of episodes that left ±500 mbar [1],
+    Columns: design, factor, level, controller; `left`, the violation rate [1],
     with its exact 95 % interval `left_low`, `left_high`; median excursion; the seed of the worst
     episode; and `summary`."""
     rows = []
@@ -169,7 +169,7 @@ def point_table(
 
 
 def share_text(row: Mapping[str, Any]) -> str:
-    """Share that leaves with its exact interval, in %; row: of `point_table`."""
+    """Violation rate with its exact interval [%]; row: of `point_table`."""
     low, value, high = (100 * row[name] for name in ("left_low", "left", "left_high"))
     return f"{value:.3g} ({low:.2g} to {high:.2g})"
 
@@ -191,7 +191,7 @@ def hurts(points: pd.DataFrame) -> pd.Series:
 
 
 def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
-    """How many changes of one thing raise the share that leaves, and which ones most."""
+    """How many changes of one thing raise the violation rate, and which ones most."""
     rows, points = [], points.assign(hurts=hurts(points))
     for controller, mine in points.groupby("controller", sort=False):
         for design in ONE_AT_A_TIME:
@@ -209,7 +209,8 @@ def harmful_changes(points: pd.DataFrame) -> pd.DataFrame:
                     {
                         "controller": controller,
                         "changed": f"{design}, ends of their ranges" if ends else design,
-                        "tried": len(some), "hurt": len(hurt), "most [% leave]": "; ".join(named) or "–",
+                        "tried": len(some), "hurt": len(hurt),
+                        "highest violation rate [%]": "; ".join(named) or "–",
                     }
                 )  # fmt: skip
     return pd.DataFrame(rows)

@@ -143,11 +143,11 @@ def deviating_sizes(q, u, c, e, d):
 
 
 @inlined
-def film_rate(q, c):
+def film_rate(q, c, e):
     """Rate at which the squeezed film slows a bouncing armature, relative to its speed [1/s]."""
     low = math.exp(-max(q.xMV, 0.0) / FILM_THICKNESS)
     high = math.exp(-max(c.xMVmax - q.xMV, 0.0) / FILM_THICKNESS)
-    return c.eMV * FILM_SPEED / FILM_THICKNESS * (low + high)
+    return e.restitution_MV * FILM_SPEED / FILM_THICKNESS * (low + high)
 
 
 @numba.njit(**FLAGS)
@@ -267,7 +267,7 @@ def _compile(digest: str):
         size = langevin_size(q, valve, deviating) if langevin else deviating.saturation
         sizes = _with_saturation(deviating, size) if langevin else deviating
         rates, force_PV, force_MV = derivative(q, inputs, valve, sizes, free_PV, free_MV, True)
-        slowed = rates.vMV - d * film_rate(q, valve) * q.vMV * free_MV
+        slowed = rates.vMV - d * film_rate(q, valve, fitted) * q.vMV * free_MV
         cooled = rates.coil_heat - d * q.coil_heat / IRON_TIME_CONSTANT
         current = rates.I
         if langevin:

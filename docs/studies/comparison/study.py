@@ -1,4 +1,4 @@
-"""Compare six controllers: random episodes on three plant sets, scenarios beyond training, sensors that
+"""Compare five controllers: random episodes on three plant sets, scenarios beyond training, sensors that
 fail, worn valves.
 
     python -m docs.studies.comparison.study
@@ -28,10 +28,8 @@ CONTROLLERS = (
     "adaptive pulse",
     "extrapolating hysteresis",
     "PWM",
-    "informed pulse",
 )
-"""The learned one, then what it is built on, classic ones, and one that knows each valve's
-parameters."""
+"""The learned one, then what it is built on, and classic ones."""
 EPISODES, QUICK = 4096, 4
 """Episodes in each plant set, and under --quick."""
 PLANTS = "sensitive_ten_percent"
@@ -47,7 +45,7 @@ BEYOND_COLUMNS = [
     "scenario", "controller", "left_percent", "left_low", "left_high", "C1_worst_excursion_bar",
 ]  # fmt: skip
 SHARE = "{left_percent:.2g} ({left_low:.2g} to {left_high:.2g})"
-"""Share that leaves the band, with its interval [%]."""
+"""Violation rate with its interval [%]."""
 COLUMNS = {
     "C1_worst_excursion_bar": ("worst excursion [bar]", "{:.2f}"),
     "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
@@ -76,7 +74,7 @@ def page_table(rows: pd.DataFrame) -> str:
 
 
 def beyond_table(rows: pd.DataFrame) -> str:
-    """Share that leaves [%]: a row for each scenario, a column for each controller. The policy's has its
+    """Violation rate [%]: a row for each scenario, a column for each controller. The policy's has its
     interval.
 
     rows: of beyond.csv.

@@ -237,7 +237,7 @@ def report(found: pd.DataFrame, cases: Sequence[Case], options: Any) -> None:
 
 
 def figures(name: Any, rows: pd.DataFrame) -> dict[str, Any]:
-    """Of a case and an arm: share of episodes that leave, rms error and switchings.
+    """Of a case and an arm: violation rate, rms error and switchings.
 
     The interval of the share is the exact one over all episodes, as wide as the training seeds at least.
     """
@@ -262,7 +262,7 @@ def summary(found: pd.DataFrame, results: pd.DataFrame) -> str:
     nominal = shares[ARMS[BEFORE]]
     gained = max(nominal - shares[TRUTH], 1e-9)
     lines = [
-        f"- Trained on the {arm}: {shares[arm]:.1f} % of the episodes leave on average. That is "
+        f"- Trained on the {arm}: violation rate {shares[arm]:.1f} % on average. That is "
         f"{100 * (nominal - shares[arm]) / gained:.0f} % of what the truth gives back."
         for arm in (ARMS[AFTER], EVERYTHING)
     ]

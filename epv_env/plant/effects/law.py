@@ -17,13 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.law_form import KNOTS, MOST_LAWS
 from epv_env.plant.effects.record import Constant, Effect, Size
 from epv_env.plant.primitives import Value, generated, inlined
 
-KNOTS = 9
-"""Knots: what a smooth law of physics needs, since it bends once or twice."""
-
-SLOTS = (1, 2, 3, 4)
+SLOTS = tuple(range(1, 1 + MOST_LAWS))
 """Numbers of the laws that may act at once."""
 
 MOST_GROWTH = 3.0

@@ -14,17 +14,15 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.law_form import KNOTS
 from identification.gap.plant import Cause, FreeParameter
-
-KNOTS = 9
-"""Knots of g between the least and the greatest state reached; a smooth law bends once or twice."""
 
 SD, LENGTH = 0.5, 0.35
 """Standard deviation of g [1], as laws of one mechanism differ by half, and the length over which it
 changes, relative to the range of the state [1]: a line or a parabola, but no ripple."""
 
-MOST_LAWS, MOST_OF_CAUSE = 4, 2
-"""Most laws that are open at once, in all and of one cause: a mechanism follows one or two states."""
+MOST_OF_CAUSE = 2
+"""Most laws of one cause that are open at once: a mechanism follows one or two states."""
 
 KEPT_VARIANCE = 0.97
 """Share of the prior's variance that the components hold [1]."""
@@ -86,10 +84,6 @@ class Law:
     def growth(self, components: NDArray) -> NDArray:
         """g at the knots, (knots,) [1]; components: (m,) [standard deviations]."""
         return COMPONENTS @ components
-
-    def at(self, components: NDArray, state: NDArray) -> NDArray:
-        """g at values (n,) of the state [SI], constant beyond the ends, (n,) [1]; components: (m,)."""
-        return np.interp(state, self.knots, self.growth(components))
 
 
 AS_ASSUMED = "as assumed"

@@ -92,7 +92,7 @@ def measure_discrepancy_reduction(
     """
     plant = problem.plant
     if not any(run.held_out for run in plant.runs):
-        raise ValueError("no run is held out: how far a gap shrinks is judged on runs never fitted to")
+        raise ValueError("no run is held out: the share closed is judged on runs never fitted to")
     predictions = {label: predict(problem, estimate) for label, estimate in estimates.items()}
     causes = [label for label in estimates if label not in (NOMINAL, RECALIBRATED)]
     best = (*causes, RECALIBRATED)[0]

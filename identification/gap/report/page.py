@@ -81,8 +81,10 @@ def sections(
 
 def _verdict(diagnosis: Diagnosis, words: Words, next_experiment: str) -> Section:
     """The first screen: what it is and how sure, why it is in doubt, what shows it, what next."""
+    nothing_missing = diagnosis.conclusion.verdict == NO_GAP
     verdicts = [
         Verdict(status=words.status, text=words.what),
+        *([Verdict(status="note", text=words.hidden)] if nothing_missing else []),
         *(Verdict(status="why", text=doubt) for doubt in words.doubts),
         *([Verdict(status="next", text=next_experiment)] if next_experiment else []),
     ]
@@ -187,12 +189,13 @@ def ranking_table(diagnosis: Diagnosis) -> Table:
         "not in the catalogue": ranking.unknown,
     }
     rest = probability_table("", others, "").rows
+    columns = ("Cause", "probability", f"size ({LEVEL_TEXT})", "share closed", "indistinguishable from")
     return Table(
-        columns=["Cause", "probability", f"size ({LEVEL_TEXT})", "closes", "looks like"],
+        columns=columns,
         rows=[*rows, *([*row, "-", "-", "-"] for row in rest)],
-        caption=f"Causes with a probability of {MENTIONED_PROBABILITY:.0%} or more. 'Looks like': "
-        "causes that these recordings hardly tell apart from this one, with the correlation of both "
-        "effects; from the model's sensitivities alone, whatever the residual.",
+        caption=f"Causes with a probability of {MENTIONED_PROBABILITY:.0%} or more. Share closed: "
+        "of the gap, on recordings never fitted to. Indistinguishable: these recordings would hardly "
+        "tell both causes apart, whatever the residual; with the correlation of what they change.",
     )
 
 

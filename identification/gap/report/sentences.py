@@ -47,7 +47,8 @@ class Words:
 def verdict_sentence(diagnosis: Diagnosis) -> tuple[str, str]:
     """Status ('good', 'doubt' or 'bad'), and the verdict with the reasons of its doubt."""
     words = words_of(diagnosis)
-    return words.status, " ".join([words.what, *words.doubts])
+    hidden = [words.hidden] if diagnosis.conclusion.verdict == NO_GAP else []
+    return words.status, " ".join([words.what, *hidden, *words.doubts])
 
 
 def words_of(diagnosis: Diagnosis) -> Words:
@@ -164,7 +165,8 @@ def parameters_at_bounds(diagnosis: Diagnosis) -> list[str]:
         for name, estimate in estimates.items()
         for p in (*problem.plant.parameters, *estimate.hypothesis.cause_parameters)
         for value in [problem.values(estimate)[p.symbol]]
-        if at_an_end(p, value) and not (p.trials and _meet(p, value, p.nominal))
+        if at_an_end(p, value)
+        and not (p in estimate.hypothesis.cause_parameters and _meet(p, value, p.nominal))
     ]
     return ends + [
         f"{name}: its strength may follow {law.argument} even more than the fit allows"

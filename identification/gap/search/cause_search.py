@@ -12,10 +12,10 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.law_form import MOST_LAWS
 from identification.gap.fit.evidence import EvaluatedHypothesis, evaluate, misfit
 from identification.gap.fit.fitting_problem import Estimate, FitCache, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import fit, linearise
-from identification.gap.fit.laws import MOST_LAWS
 from identification.gap.fit.recalibration import with_own_nuisances
 from identification.gap.fit.variable_projection import normal_equations
 from identification.gap.search.law_screening import law_starts, over_reached_states

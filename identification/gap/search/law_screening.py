@@ -10,9 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from epv_env.common.law_form import MOST_LAWS
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
 from identification.gap.fit.gauss_newton import linearise
-from identification.gap.fit.laws import COMPONENTS, LARGEST, MOST_LAWS, MOST_OF_CAUSE, Law
+from identification.gap.fit.laws import COMPONENTS, LARGEST, MOST_OF_CAUSE, Law
 from identification.gap.fit.recalibration import restarted
 from identification.gap.fit.variable_projection import LinearisedRun, equations_of, products_of
 from identification.gap.plant import Cause
@@ -145,7 +146,7 @@ def over_reached_states(problem: FittingProblem, estimate: Estimate) -> Estimate
     for law, components in estimate.laws:
         low, high = ranges[law.argument]
         moved = replace(law, low=low, high=high) if low < high else law
-        growth = law.at(components, moved.knots)
+        growth = np.interp(moved.knots, law.knots, law.growth(components))
         mean = float(np.mean(growth))
         factor = max(1.0 + mean, 0.1)  # on the size, which stands for the mean of the law
         parts = np.linalg.lstsq(COMPONENTS, (growth - mean) / factor, rcond=None)[0]

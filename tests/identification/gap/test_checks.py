@@ -218,6 +218,18 @@ def test_what_has_no_effect_is_a_warning():
     assert second.startswith("causes, rust has no effect on any trusted reading")
 
 
+def test_a_channel_that_shows_nothing_but_noise_is_a_warning():
+    rng, plant = np.random.default_rng(0), Described()
+    noise = plant.channels[0].known_noise
+
+    def still(run: Run, of_noise: float) -> Run:
+        return replace(run, measured=0.2 + of_noise * noise * rng.standard_normal(run.measured.shape))
+
+    silent = Described(runs=[still(run, 1.0) for run in plant.runs])
+    assert "shows nothing but noise about 200 mm" in " ".join(check(silent))
+    assert not check(Described(runs=[still(run, 3.0) for run in plant.runs]))
+
+
 def test_parameters_that_act_alike_are_a_warning():
     class Twice(Described):
         def outputs(self, values, runs):

@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import replace
+from typing import Any
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -131,11 +132,14 @@ def test_rivals_are_named_together_with_what_would_decide():
     )
 
 
-def at_end(found: Diagnosis, end: str = "high") -> Diagnosis:
-    """The diagnosis with the leak at an end of its range."""
+def at_end(found: Diagnosis, end: str = "high", **changes: Any) -> Diagnosis:
+    """The diagnosis with the leak at an end of its range. changes: of the leak's parameter."""
     best, *others = found.conclusion.ambiguity_set
     estimate = best.hypothesis.estimate
-    leak = estimate.hypothesis.parameters[0]
+    leak = replace(estimate.hypothesis.parameters[0], **changes)
+    (cause,) = estimate.hypothesis.causes
+    hypothesis = replace(estimate.hypothesis, causes=(replace(cause, parameters=(leak,)),))
+    estimate = replace(estimate, hypothesis=hypothesis)
     vector = np.array([*estimate.vector[:-1], getattr(leak, end) / leak.scale])
     changed = replace(best.hypothesis, estimate=replace(estimate, vector=vector))
     conclusion = replace(found.conclusion, ambiguity_set=[replace(best, hypothesis=changed), *others])
@@ -149,6 +153,7 @@ def test_a_size_at_an_end_of_its_range_is_a_warning():
         "leak: leak is at an end of its physical range (0.0500 1/s)"
     ]
     assert parameters_at_bounds(at_end(found, "low")) == [], "no leak at all says nothing"
+    assert parameters_at_bounds(at_end(found, "low", trials=())) == [], "nor does the usual form"
     assert [v.status for v in sections(at_end(found))[0].verdicts] == ["doubt", "why"]
     assert [v.status for v in sections(found)[0].verdicts] == ["good"]
 

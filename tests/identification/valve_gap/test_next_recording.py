@@ -12,7 +12,7 @@ from epv_env.plant.parameters import Parameters
 from identification.bench.programmes import load_programmes
 from identification.bench.session import run_programme
 from identification.gap.fit.fitting_problem import Estimate, FittingProblem, Hypothesis
-from identification.gap.judge.verdict import AMBIGUOUS, NO_GAP, UNKNOWN
+from identification.gap.judge.verdict import AMBIGUOUS, KNOWN, NO_GAP, UNKNOWN
 from identification.report_2003 import Case
 from identification.valve_gap.diagnose import _plan
 from identification.valve_gap.next_recording import CANDIDATES, next_recording, planned, separation
@@ -72,6 +72,14 @@ def test_the_programme_that_separates_most_comes_first(programmes, probabilities
     found = next_recording(ranking(*probabilities), valve(), verdict, programmes)
     assert found.text.startswith(text)
     assert not found.table or found.table.rows == sorted(found.table.rows, key=lambda r: -float(r[1]))
+
+
+def test_a_law_of_the_same_cause_is_no_other_answer():
+    found = ranking(0.5, 0.01)
+    found.hypotheses, found.probabilities = found.hypotheses * 2, [0.5, 0.49]  # as assumed, with a law
+    text = next_recording(found, valve(), KNOWN, [OPENING]).text
+    assert text.startswith("No further recording is needed")
+    assert text.endswith("(seat_leak): 99 %).")
 
 
 def test_the_bench_reads_the_programme_that_is_written(tmp_path):

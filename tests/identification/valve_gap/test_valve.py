@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from epv_env.common.law_form import KNOTS
 from epv_env.plant.channels import SENSORS
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
@@ -12,7 +13,6 @@ from identification.calibration.problem import calibration_problem
 from identification.gap.diagnosis import rank_hypotheses
 from identification.gap.fit.evidence import percentage_errors, with_settled_runs
 from identification.gap.fit.fitting_problem import FittingProblem, Hypothesis
-from identification.gap.fit.laws import KNOTS
 from identification.gap.judge.verdict import Ranking
 from identification.gap.prepare.prepared_plant import prepared
 from identification.recordings.recording import OUTPUTS, UNITS, Campaign

@@ -6,6 +6,7 @@ import pytest
 from docs.studies.blind.forms import (
     LANGEVIN,
     OTHER_FORMS,
+    _rates_and_forces,
     langevin_force,
     langevin_slope,
     right_hand_side,
@@ -17,8 +18,6 @@ from epv_env.plant.effects.registry import effect_constants
 from epv_env.plant.equations import Inputs, State
 from epv_env.plant.parameters import Parameters
 from tests.reference.hybrid_automaton import COMPILED_RIGHT_HAND_SIDES
-
-pytestmark = pytest.mark.slow
 
 PLANT = COMPILED_RIGHT_HAND_SIDES[True]
 CURRENT = State._fields.index("I")
@@ -56,11 +55,20 @@ def all_rates(function, p, warm=0.0):
     return np.array([found(q, U) for q in states(warm) for U in (0.0, 18.9)])
 
 
-def test_without_deviation_the_forms_are_the_plant_s():
+def uncompiled(y, u, c, e, free_PV, free_MV):
+    """The forms in Python without deviation, in milliseconds."""
+    return _rates_and_forces.py_func(y, u, c, e, free_PV, free_MV, 0.0, False, False)
+
+
+@pytest.mark.parametrize(
+    "forms", [uncompiled, pytest.param(right_hand_side(0.0), marks=pytest.mark.slow)]
+)
+def test_without_deviation_the_forms_are_the_plant_s(forms):
     sizes = {symbol: size for record in RECORDS for symbol, size in largest(record).items()}
     p = Parameters.calibrated().replace(**sizes)
+    plant = PLANT.py_func if forms is uncompiled else PLANT
     np.testing.assert_allclose(
-        all_rates(right_hand_side(0.0), p, 20.0), all_rates(PLANT, p, 20.0), rtol=1e-12
+        all_rates(forms, p, 20.0), all_rates(plant, p, 20.0), rtol=1e-12, atol=1e-12
     )
 
 
@@ -77,6 +85,7 @@ def state(**changed):
     return usual._replace(**changed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", OTHER_FORMS)
 def test_the_other_form_is_the_plant_without_the_effect_and_another_with_it(name):
     other = right_hand_side(0.0, [name])
@@ -86,6 +95,7 @@ def test_the_other_form_is_the_plant_without_the_effect_and_another_with_it(name
     assert np.max(np.abs(found - fitted) / np.maximum(np.abs(fitted), 1e-9)) > 0.01
 
 
+@pytest.mark.slow
 def test_the_armature_s_force_and_the_current_s_rate_are_those_of_the_langevin_curve():
     p, q = top(LANGEVIN), state(vMV=0.0)
     gap = 1.0 / (p["mu0"] * np.pi / 4 * p["dMB"] ** 2)

@@ -41,35 +41,35 @@ $network};
 void epv_policy_observe(epv_policy_memory *m, const epv_policy_readings *now,
                         float inputs[EPV_POLICY_INPUTS])
 {
-    epv_senses *const s = &m->senses;
-    float since;
-    s->now[0] = now->p1;
-    s->now[1] = now->p2;
-    s->now[2] = now->p3;
-    s->now[3] = now->current;
-    s->now[4] = now->target;
-    if (s->periods == 0.0f)
+    epv_readings r;
+    if (m->senses.periods == 0.0f)
         m->waited = LONGEST_WAIT;
     else if (now->coil != m->coil)
         m->waited = 1;
     else if (m->waited < LONGEST_WAIT)
         m->waited++;
     m->coil = now->coil;
-    since = (float)m->waited * PERIOD;
-    inputs[$action] = fn_entry((float)now->coil, $action);
-    inputs[$since] = fn_entry(lesser(since, LONGEST), $since);
-    fn_hold(s, inputs, EPV_POLICY_READINGS, PERIOD);
-    fn_remember(s);
-    fn_show(s, inputs, EPV_POLICY_READINGS);
+    r.p1 = now->p1;
+    r.p2 = now->p2;
+    r.p3 = now->p3;
+    r.current = now->current;
+    r.target = now->target;
+    r.coil = (float)now->coil;
+    r.waited = lesser((float)m->waited * PERIOD, LONGEST);
+    fn_hold(&m->senses, &r, PERIOD);
+    fn_remember(&m->senses);
+    fn_show(&m->senses, &r, inputs);
 }
 
 int epv_policy_learn(epv_policy_memory *m, float inputs[EPV_POLICY_INPUTS])
 {
-    fn_watch(&m->senses, inputs, EPV_POLICY_READINGS, PERIOD);
-    fn_observe(&m->valve, inputs, EPV_POLICY_READINGS, PERIOD, $filter_time, 0.0f);
+    epv_readings r;
+    fn_read(&r, inputs);
+    fn_watch(&m->senses, &r, PERIOD);
+    fn_observe(&m->valve, &r, PERIOD, $filter_time, 0.0f);
     fn_plan(&m->valve, PERIOD);
-$learnt
-    return (int)fn_forced(&m->valve, fn_in_unit(inputs, EPV_POLICY_READINGS, $error));
+    fn_show_learnt(&m->valve, inputs);
+    return (int)fn_forced(&m->valve, r.error);
 }
 
 void epv_policy_logits(const float inputs[EPV_POLICY_INPUTS], float logits[2])
@@ -95,7 +95,7 @@ int epv_policy_step(epv_policy_memory *m, const epv_policy_readings *now)
     force = epv_policy_learn(m, inputs);
     epv_policy_logits(inputs, logits);
     off = force < 0 || (force == 0 && logits[0] >= logits[1]);
-    if (fn_above_band(fn_in_unit(inputs, EPV_POLICY_READINGS, $error)) != 0.0f)
-        return 1; /* this shield holds for the fall-back, too */
+    if (force > 1)
+        return 1;
     return fn_overruled(&m->senses, off ? 0.0f : 1.0f) != 0.0f;
 }

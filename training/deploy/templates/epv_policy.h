@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define EPV_POLICY_READINGS $readings
+#define EPV_POLICY_READINGS $entries
 #define EPV_POLICY_INPUTS $inputs
 #define EPV_POLICY_PERIOD_US $period_us
 
@@ -52,9 +52,9 @@ typedef struct {
 /* One period: remember the readings, return what the coil shall do next (0 off, 1 on). */
 int epv_policy_step(epv_policy_memory *memory, const epv_policy_readings *now);
 
-/* Its parts: the readings as the observation (the first EPV_POLICY_READINGS
- * entries of the inputs), what is learnt and advised (the entries behind them; returns 1 if a rule keeps the
- * coil on, -1 if a shield switches it off, else 0), and the network's {off, on}. */
+/* Its parts: the readings as the observation (the first EPV_POLICY_READINGS inputs), what is learnt
+ * and advised (the inputs behind them; returns 1 if a rule keeps the coil on, 2 if a shield does so
+ * whatever decides, -1 if a shield switches it off, else 0), and the network's {off, on}. */
 void epv_policy_observe(epv_policy_memory *memory, const epv_policy_readings *now,
                         float inputs[EPV_POLICY_INPUTS]);
 int epv_policy_learn(epv_policy_memory *memory, float inputs[EPV_POLICY_INPUTS]);
