@@ -93,6 +93,7 @@ def rounding_error(step: float) -> float:
     return float(step / np.sqrt(12.0))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # an absurd reading is no multiple
 def quantisation_step(series: Sequence[NDArray], fewest: int = FEWEST_DISTANCES) -> float:
     """Step of which all readings are multiples, but for an offset.
 

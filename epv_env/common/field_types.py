@@ -10,6 +10,7 @@ from types import UnionType
 from typing import Any, get_args, get_origin, get_type_hints
 
 import numpy as np
+from numpy.typing import NDArray
 
 WORDS: dict[Any, str] = {
     float: "a number",
@@ -39,6 +40,14 @@ def real(value: Any) -> float:
         return float(value)
     except OverflowError:
         return math.inf
+
+
+def numbers(values: Any, *shape: int) -> NDArray:
+    """Decoded JSON as an array. Raises ValueError unless it is of finite numbers in this shape."""
+    found = np.array(values)
+    if found.shape != shape or found.dtype.kind not in "bif" or not np.all(np.isfinite(found)):
+        raise ValueError(f"not {shape} finite numbers")
+    return found
 
 
 def check_fields(instance: Any, error: type[ValueError] = ValueError) -> None:

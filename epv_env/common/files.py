@@ -70,7 +70,7 @@ TEMPORARY = re.compile(r"\..+\.[0-9a-f]{8}")
 def remove_leftovers(folder: Path) -> None:
     """Remove what killed writers left in a folder into which nobody else writes."""
     for path in [path for path in folder.rglob(".*") if TEMPORARY.fullmatch(path.name)]:
-        if path.is_dir():
+        if path.is_dir() and not path.is_symlink():
             shutil.rmtree(path)
         else:
             path.unlink(missing_ok=True)  # it may have gone with its folder
@@ -179,7 +179,17 @@ def _parsed(text: str, *, allow_nan: bool) -> Any:
             raise ValueError(f"{name} is no number")
         return float(name)
 
-    content = json.loads(text, parse_int=whole, parse_float=number, parse_constant=constant)
+    def fields(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+        found: dict[str, Any] = {}
+        for name, value in pairs:
+            if name in found:  # programs disagree which of the two counts
+                raise ValueError(f"the field {name[:40]!r} stands twice in an object")
+            found[name] = value
+        return found
+
+    content = json.loads(
+        text, parse_int=whole, parse_float=number, parse_constant=constant, object_pairs_hook=fields
+    )
     _check_depth(content)
     return content
 
@@ -289,7 +299,7 @@ class Journal:
     def _entry(self, line: bytes, number: int) -> tuple[str, Any]:
         """Name and result in a line of the file. Raises ValueError if it is damaged."""
         try:
-            entry = json.loads(line)
+            entry = _parsed(line.decode(), allow_nan=True)
             name, result = entry["name"], entry["result"]
             if isinstance(name, str) and entry["check"] == _checksum(*map(json.dumps, (name, result))):
                 return name, result

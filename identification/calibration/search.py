@@ -5,6 +5,7 @@ The starts show whether a minimum is the global one.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from functools import partial
 from time import perf_counter
 from typing import Any
 
@@ -13,6 +14,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.stats import qmc
 
+from epv_env.common.field_types import check_fields, numbers
 from epv_env.common.files import Journal
 from epv_env.common.results_folder import progress
 from identification.calibration.problem import CalibrationProblem, ParameterVector
@@ -65,10 +67,15 @@ class SearchResult:
         return {**self.__dict__, "start": self.start.tolist(), "z": self.z.tolist()}
 
     @classmethod
-    def from_json(cls, content: Mapping[str, Any]) -> "SearchResult":
-        """A fit as `as_json` wrote it."""
-        arrays = {name: np.array(content[name]) for name in ("start", "z")}
-        return cls(**{**content, **arrays})
+    def from_json(cls, content: Mapping[str, Any], start: NDArray) -> "SearchResult":
+        """A fit as `as_json` wrote it. Raises ValueError if it has another start (k,), or no numbers."""
+        arrays = {name: numbers(content[name], *start.shape) for name in ("start", "z")}
+        found = cls(**{**content, **arrays})
+        check_fields(found)
+        numbers([found.error, found.seconds], 2)
+        if not np.array_equal(found.start, start):
+            raise ValueError("of another start")
+        return found
 
 
 class TotalError:
@@ -174,7 +181,8 @@ def search_from_all_starts(
         name = f"{method} {index}"
         if name not in journal:
             journal.add(name, searches[method](problem, starts[index]).as_json())
-        searched[method].append(journal.read(name, SearchResult.from_json))
+        read = partial(SearchResult.from_json, start=starts[index])
+        searched[method].append(journal.read(name, read))
     return searched
 
 

@@ -28,6 +28,10 @@ def read_mdf(path: Path) -> tuple[str, list[SourceChannel]]:
     with path.open("rb") as stream:
         if stream.read(3) not in MDF_SIGNATURES:  # asammdf would print a traceback beside its error
             raise ValueError("it does not begin as MDF does")
+    # It would print a traceback for a file whose reading failed; `with` closes the others.
+    for version in (3, 4):
+        module = needed_package(f"asammdf.blocks.mdf_v{version}", "MDF files")
+        getattr(module, f"MDF{version}").__del__ = lambda _: None
     with asammdf.MDF(path) as mdf:
         numbers = sum(group.channel_group.cycles_nr * len(group.channels) for group in mdf.groups)
         check_unpacked(path, numbers * NUMBER)

@@ -35,6 +35,9 @@ LEAST_RATE = 500.0
 HARMLESS_JITTER = 1e-3
 """Part of a period by which a sample may be off; the steepest signal then moves by less than noise."""
 
+MOST_COLUMNS = 1000
+"""A table of more columns would take minutes to read."""
+
 MOST_DIGITS = 9
 """Most decimals of a second with which files print times."""
 
@@ -96,6 +99,10 @@ def _cells(file: str, content: bytes) -> pd.DataFrame:
     """Every cell as text, the header in the first row; NaN where a line ends early."""
     try:
         text = content.decode("utf-8-sig").rstrip()
+        if (count := text.partition("\n")[0].count(",") + 1) > MOST_COLUMNS:
+            raise CampaignError(
+                f"{file}, line 1: {count} columns: leave out what docs/reference/files.md does not name"
+            )
         return pd.read_csv(
             io.StringIO(text), header=None, dtype=object, keep_default_na=False, skip_blank_lines=False
         )

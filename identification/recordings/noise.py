@@ -53,6 +53,7 @@ def campaign_noise(campaign: Campaign) -> dict[str, float]:
     return {name: max(noise_of(recordings, name), rounding_error(least[name])) for name in CHANNELS}
 
 
+@np.errstate(over="ignore", invalid="ignore")  # an absurd reading lies off the grid
 def coarse_steps(pressures: Mapping[str, NDArray], sizes: Mapping[str, float]) -> dict[str, float]:
     """Steps of those pressures whose noise need not move the reading, by name [unit of the pressures].
 

@@ -95,8 +95,18 @@ def test_what_a_killed_writer_left_goes_with_the_next_one(tmp_path):
     ):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
+    (tmp_path / ".link.0123abcd").symlink_to(tmp_path.parent)  # what it points to stays
     with only_writer(tmp_path):
         assert {path.name for path in tmp_path.iterdir()} == {"kept.0123abcd", ".hidden", ".lock"}
+
+
+def test_a_lock_that_is_a_link_out_of_the_folder_is_not_followed(tmp_path):
+    (tmp_path / "out").mkdir()
+    (tmp_path / "precious").write_text("kept")
+    (tmp_path / "out" / ".lock").symlink_to(tmp_path / "precious")
+    with pytest.raises(OSError, match=r"\.lock"), only_writer(tmp_path / "out"):
+        pass
+    assert (tmp_path / "precious").read_text() == "kept"
 
 
 def test_a_missing_package_is_named_with_its_extra(package, tmp_path, capsys):

@@ -78,6 +78,7 @@ def test_a_wrong_file_ends_in_one_sentence(tmp_path, content, sentence):
         (b'{"a": 9223372036854775808}', "beyond 64 bits"),
         (b'{"a": 1e999}', "beyond double precision"),
         (b'{"a": NaN}', "NaN is no number"),
+        (b'{"a": {"b": 1, "c": 2, "b": 3}}', "the field 'b' stands twice in an object"),
         (b'{"a": "\xff"}', "not JSON in UTF-8"),
         (b"", "not JSON"),
     ],

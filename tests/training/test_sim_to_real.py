@@ -104,6 +104,21 @@ def test_what_is_finished_is_kept(finished):
     assert times() == before
 
 
+@pytest.mark.parametrize(
+    ("file", "field", "words"),
+    [("diagnosis/plant.json", "provenance", "is no diagnosis of"),
+     ("withheld/plant.json", "effects", "is not the valve with command_delay=0.006")],
+)  # fmt: skip
+def test_what_was_edited_is_no_step_of_this_loop(finished, file, field, words, capsys):
+    kept = (finished / file).read_text()
+    content = json.loads(kept)
+    content[field].clear()
+    (finished / file).write_text(json.dumps(content))
+    assert run_loop(finished, "--effect", "command_delay=0.006") == 2
+    assert words in capsys.readouterr().err
+    (finished / file).write_text(kept)
+
+
 @pytest.mark.parametrize("last", ["plant.json", "campaign.json"])
 def test_a_bench_that_was_killed_between_its_files_records_anew(last, tmp_path, monkeypatch):
     replace = os.replace

@@ -14,6 +14,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Annotated, Any
 
+import msgspec
 import numpy as np
 import pandas as pd
 from matplotlib.figure import Figure
@@ -24,7 +25,7 @@ from controllers.policy_files import holds_policy, policy_digest
 from controllers.tuned import load_tunings
 from epv_env.common.command_line import NextStep, beside
 from epv_env.common.extras import DISTRIBUTION
-from epv_env.common.files import Journal, decoded, digest, write_json, write_text
+from epv_env.common.files import Journal, digest, read_json, write_json, write_text
 from epv_env.common.options import Count, Folder, JudgedSeconds, Names, Quick, Seed
 from epv_env.common.results_folder import check_options, write_options
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject
@@ -32,8 +33,8 @@ from epv_env.plant.region import Mixture
 from epv_env.reward import RewardWeights
 from identification.bench.programmes import SUITES
 from identification.commands import bench
-from identification.gap.report.gap_json import GAP
-from identification.recordings.campaign_files import FILE_NAME
+from identification.gap.report.gap_json import FORMAT, GAP
+from identification.recordings.campaign_files import FILE_NAME, read_campaign
 from training.evaluation.named import HELP, named_controllers
 from training.evaluation.plots import COLOURS, plt, save_figure
 from training.evaluation.scenarios import EvaluationScenario
@@ -106,11 +107,15 @@ def run(options: Options) -> None:
         suite=options.suite, effect=[options.effect], seed=options.seed,
         out=out / CAMPAIGN, truth=out / WITHHELD,
     )  # fmt: skip
-    bench.true_parameters(recording, load_plant(None))  # refuses an effect that cannot be used
+    truth = bench.true_parameters(recording, load_plant(None))  # refuses an effect that cannot be used
     write_options(out, settings)  # before what it belongs to: a run may stop anywhere
     if not (out / CAMPAIGN / FILE_NAME).exists():  # which the bench writes last
         print("[the bench records its valve]", file=sys.stderr)
         bench.run(recording)
+    if load_plant(out / WITHHELD).parameters != truth:
+        raise ValueError(
+            f"{out / WITHHELD} is not the valve with {options.effect}: choose another --out"
+        )
     report(loop(options), options)
 
 
@@ -127,6 +132,11 @@ def loop(options: Options, mounted: Mounted = lambda policy: policy) -> Results:
         print("[diagnose the campaign]", file=sys.stderr)
         gap.run(gap.Options(out / CAMPAIGN, out=out / DIAGNOSIS, seed=options.seed))
     corrected = load_plant(out / DIAGNOSIS / CORRECTED)
+    fitted = {r.name: r.sha256 for r in read_campaign(out / CAMPAIGN).recordings if r.role != "quality"}
+    if corrected.diagnosis is None or corrected.provenance.get("recordings_sha256") != fitted:
+        raise ValueError(
+            f"{out / DIAGNOSIS} is no diagnosis of {out / CAMPAIGN}: {AGAIN.format(out / DIAGNOSIS)}"
+        )
     return results | deployed(AFTER, corrected, "diagnosis", options, mounted)
 
 
@@ -174,10 +184,9 @@ def deployed(
 def report(results: Results, options: Options) -> None:
     """Write the files of results, and print what they say of the valve itself."""
     out, performance, gaps = options.out, rows(results), gap_table(results)
-    diagnosis = decoded(out / DIAGNOSIS / GAP, remedy=f"remove {out / DIAGNOSIS}")
     content = {
         "withheld": options.effect,
-        "diagnosis": {key: diagnosis[key] for key in ("verdict", "causes", "ambiguity_set", "gap")},
+        "diagnosis": msgspec.to_builtins(kept_diagnosis(out / DIAGNOSIS)),
         "aims": performance.to_dict("records"),
         "gaps": gaps.to_dict("records"),
     }
@@ -224,10 +233,26 @@ def trained(
     return load_policy(folder, plant)
 
 
+AGAIN = "remove {}, and the diagnosis runs again"
+
+
+class KeptDiagnosis(msgspec.Struct):
+    """What the report takes from gap.json."""
+
+    verdict: str
+    causes: list[Any]
+    ambiguity_set: list[Any]
+    gap: dict[str, Any]
+
+
+def kept_diagnosis(folder: Path) -> KeptDiagnosis:
+    """That of a folder of a diagnosis. Raises JSONFileError."""
+    return read_json(folder / GAP, KeptDiagnosis, version=FORMAT, remedy=AGAIN.format(folder))
+
+
 def diagnosis_text(folder: Path) -> str:
     """Verdict and alternatives of the diagnosis in a folder."""
-    verdict = decoded(folder / GAP, remedy=f"remove {folder}, and the diagnosis runs again")["verdict"]
-    diagnosis = load_plant(folder / CORRECTED).diagnosis
+    verdict, diagnosis = kept_diagnosis(folder).verdict, load_plant(folder / CORRECTED).diagnosis
     assert diagnosis is not None  # which every diagnosis writes
     best, *others = diagnosis.alternatives
     first = f"{verdict}: {best.name.replace('_', ' ')} {best.probability:.2f}"

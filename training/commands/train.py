@@ -161,13 +161,14 @@ def begin_folder(options: Options, plant: Plant) -> None:
     Raises ValueError if the folder holds another training, or none to resume.
     """
     folder: Path = options.out
-    earlier = read_config(folder, dict[str, Any])
+    earlier = read_config(folder, dict[str, dict[str, Any]])
     if options.resume:
         if earlier is None:
             raise ValueError(f"nothing to resume in {folder}: leave --resume out")
         now = configuration(options, plant)
         same = {name: now["options"][name] for name in SAME_WHEN_RESUMED}
-        check_same(earlier["options"], same, f"{folder} was trained with", "resume with the same")
+        begun = earlier.get("options", {})
+        check_same(begun, same, f"{folder} was trained with", "resume with the same")
         if earlier.get("plant") != now["plant"]:
             raise ValueError(
                 f"the plant is another than {folder} was trained with: resume with the same plant file, "

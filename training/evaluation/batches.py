@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import asdict, dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from threadpoolctl import threadpool_limits
 from tqdm import tqdm
 
 from controllers.base import Controller, decides_on_device
+from epv_env.common.field_types import numbers
 from epv_env.common.files import Journal
 from epv_env.common.results_folder import progress
 from epv_env.plant.valves import available_cores
@@ -100,8 +102,8 @@ def run_batches(
 
     def metrics(part: Batch) -> EpisodeMetrics:
         if journal is None or part.name in finished:
-            return _metrics(finished[part.name])
-        return journal.read(part.name, _metrics)
+            return kept_metrics(finished[part.name], part.episodes)
+        return journal.read(part.name, partial(kept_metrics, episodes=part.episodes))
 
     return [EpisodeMetrics.joined([metrics(part) for part in each]) for each in parts]
 
@@ -169,5 +171,6 @@ def _run(batch: Batch, controller: Controller) -> tuple[str, dict[str, list[Any]
     return batch.name, {name: np.asarray(v).tolist() for name, v in asdict(metrics).items()}
 
 
-def _metrics(figures: Mapping[str, list[Any]]) -> EpisodeMetrics:
-    return EpisodeMetrics(**{name: np.array(values) for name, values in figures.items()})
+def kept_metrics(figures: Mapping[str, list[Any]], episodes: int) -> EpisodeMetrics:
+    """Figures in a journal. Raises ValueError unless each is a number for each of so many episodes."""
+    return EpisodeMetrics(**{name: numbers(values, episodes) for name, values in figures.items()})

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from typing import Any
 
@@ -65,9 +66,15 @@ CHECKPOINTS = "checkpoints"
 """Folder of the checkpoints, within that of the training: arrays, of which none is a program."""
 ADAM = ("step", "exp_avg", "exp_avg_sq")
 """What the optimiser keeps of each weight: the number of its steps, and two moments of its shape."""
+LARGEST = 10**9
+"""Magnitude, and number of steps, beyond which a checkpoint is none."""
 BEST = "best"
 """Folder of the best validated policy, within that of the training."""
 VALIDATION_FILE = "validation.csv"
+ROW = (
+    "timesteps", "score", "episodes", "left", "mean_return", "rms_error_bar", "switchings_per_s"
+)  # fmt: skip
+"""Its columns."""
 CHECKPOINT_STEPS = 1_000_000
 """Environment steps between two checkpoints. New episodes begin with each, so a training that is resumed
 there meets the same ones as an uninterrupted one."""
@@ -235,7 +242,7 @@ def train(
     torch.set_num_threads(1)  # sums do not depend on the machine's cores; the plant uses them all
     env = make_training_env(num_envs=num_envs, **vars(task))
     model = make_model(env, seed=seed)
-    resumed = resume and load_checkpoint(model, folder)
+    resumed = resume and load_checkpoint(model, folder, timesteps)
     model.set_logger(Logger(folder=None, output_formats=[]))  # the default leaves a folder in /tmp
     seed_episodes(model, seed)
     if model.num_timesteps < timesteps:
@@ -274,18 +281,26 @@ def save_checkpoint(model: PPO, folder: Path) -> None:
     write_bytes(folder / CHECKPOINTS / f"{model.num_timesteps:010}.safetensors", save(arrays))
 
 
-def load_checkpoint(model: PPO, folder: Path) -> bool:
-    """Take up the newest checkpoint that is whole. Returns whether there is one."""
+def load_checkpoint(model: PPO, folder: Path, timesteps: int) -> bool:
+    """Take up the newest checkpoint that is whole. Returns whether there is one.
+
+    timesteps: of the whole training.
+    """
     weights, optimiser = model.policy.state_dict(), model.policy.optimizer.state_dict()
-    shapes = {f"{kind} {n}": w.shape for n, w in weights.items() for kind in ("weights", *ADAM[1:])}
-    shapes |= {f"{ADAM[0]} {name}": torch.Size() for name in weights} | {"timesteps": torch.Size()}
+    kinds = ("weights", *ADAM[1:])
+    forms = {f"{kind} {n}": (w.shape, w.dtype) for n, w in weights.items() for kind in kinds}
+    forms |= {f"{ADAM[0]} {name}": (torch.Size(), torch.float32) for name in weights}
+    forms["timesteps"] = torch.Size(), torch.int64
     for path in checkpoints(folder):
         try:
             arrays = load(read_bytes(path))
         except (OSError, ValueError, KeyError, SafetensorError):
             continue  # torn
-        if {name: array.shape for name, array in arrays.items()} != shapes:
-            continue
+        found = {name: (array.shape, array.dtype) for name, array in arrays.items()}
+        if found != forms or not all(_sane(*each) for each in arrays.items()):
+            continue  # no training writes that
+        if arrays["timesteps"] >= timesteps:
+            continue  # it would end the training with the policy that there is
         states = {i: {k: arrays[f"{k} {name}"] for k in ADAM} for i, name in enumerate(weights)}
         model.policy.load_state_dict({name: arrays[f"weights {name}"] for name in weights})
         model.policy.optimizer.load_state_dict({**optimiser, "state": states})
@@ -294,10 +309,22 @@ def load_checkpoint(model: PPO, folder: Path) -> bool:
     return False
 
 
+def _sane(name: str, array: torch.Tensor) -> bool:
+    """Whether a training may go on from an array of a checkpoint: no infinities follow from it."""
+    least = -LARGEST if name.startswith(("weights ", "exp_avg ")) else 0
+    return bool(((array >= least) & (array <= LARGEST)).all())
+
+
 def read_rows(folder: Path) -> list[dict[str, float]]:
     """The table of a folder's validations; empty if there was none."""
     path = folder / VALIDATION_FILE
     if not path.exists():
         return []
-    rows: Any = pd.read_csv(path, dtype=float).to_dict("records")
+    try:
+        table = pd.read_csv(BytesIO(read_bytes(path)), dtype=float)
+    except ValueError:
+        table = pd.DataFrame()
+    if tuple(table) != ROW or not np.all(np.isfinite(table)):
+        raise ValueError(f"{path} is damaged: begin the training anew, or choose another --out")
+    rows: Any = table.to_dict("records")
     return rows

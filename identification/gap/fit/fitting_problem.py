@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from epv_env.common.field_types import numbers
 from epv_env.common.files import Journal
 from identification.gap.fit.laws import Law
 from identification.gap.plant import Cause, FreeParameter, GreyBox, NuisanceParameter, noise_weighted
@@ -188,18 +189,22 @@ class FitCache:
         return estimates
 
     def _estimate(self, entry: dict[str, Any]) -> Estimate:
+        """An estimate as the journal has it. Raises ValueError and others for what is none."""
         causes = {cause.label: cause for cause in self.plant.causes}
-        runs = len(self.plant.runs)
-        return Estimate(
-            hypothesis=Hypothesis(
-                causes=tuple(causes[label] for label in entry["causes"]),
-                laws=tuple(
-                    Law(cause=causes[label], argument=argument, low=low, high=high)
-                    for label, argument, low, high in entry["laws"]
-                ),
+        hypothesis = Hypothesis(
+            causes=tuple(causes[label] for label in entry["causes"]),
+            laws=tuple(
+                Law(cause=causes[label], argument=argument, low=low, high=high)
+                for label, argument, low, high in entry["laws"]
             ),
-            vector=np.array(entry["vector"]),
-            run_values=np.array(entry["local"]).reshape(runs, -1),
+        )
+        count = len(self.plant.parameters) + len(hypothesis.parameters)
+        if not entry["chi_square"] >= 0:
+            raise ValueError("no sum of squares")
+        return Estimate(
+            hypothesis=hypothesis,
+            vector=numbers(entry["vector"], count),
+            run_values=numbers(entry["local"], len(self.plant.runs), len(hypothesis.run_parameters)),
             chi_square=entry["chi_square"],
             converged=entry["converged"],
             given_up=entry["given_up"],
