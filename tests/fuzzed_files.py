@@ -32,7 +32,7 @@ from identification.monitor.model import MonitorModel
 from identification.monitor.monitor import Monitor
 from identification.recordings.campaign_files import FILE_NAME, read_campaign, write_campaign
 from identification.recordings.log_files import read_log
-from identification.valve_gap.operation import steady_openings
+from identification.valve_gap.logged_valve import steady_openings
 from tests.identification.gap.drives import Drive
 from tests.identification.importing.dialects import DIALECTS
 from tests.identification.monitor.test_monitor import white_model
