@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from controllers.knowledge import READINGS
 from controllers.policy import TRAINED, load_policy
 from controllers.policy_files import CONTRACT_FILE, WEIGHTS_FILE
 from controllers.tuned import load_search, load_tunings, save_tunings, tuned
 from epv_env.common.files import Journal, write_json
 from epv_env.common.results_folder import CONFIG, check_options, write_options
+from epv_env.observation import ENTRIES
 from epv_env.plant.plantfile import Plant, load_plant, plant_subject, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from epv_env.reward import RewardWeights
@@ -54,7 +54,7 @@ VALVE = Plant.calibrated()
 def _decide(path: Path) -> None:
     policy = load_policy(path.parent)
     policy.reset(2)
-    assert set(policy.act(np.zeros((2, READINGS)))) <= {0, 1}
+    assert set(policy.act(np.zeros((2, ENTRIES)))) <= {0, 1}
 
 
 def _monitor(path: Path) -> None:
