@@ -100,12 +100,12 @@ def _beginning(learnt: Diagnosis) -> Verdict:
 
 def _change(found: Diagnosis, label: str, onset: Onset) -> Verdict:
     """Since when, what, how sure, and whether it is mended."""
-    since = f"since {onset.drive} ({probability_text(onset.probability)}"
+    since = f"since {onset.drive} ({probability_text(onset.probability)})"
     if onset.earliest != onset.latest:
-        since += f"; with 95 % since one from {onset.earliest} to {onset.latest}"
-    text = f"The valve has changed {since}): {_what(found, label)}."
+        since = f"since a drive from {onset.earliest} to {onset.latest} (95 %)"
+    text = f"The valve has changed {since}: {_what(found, label)}."
     if _is_gone(found, label):
-        text = f"What the valve differed by is gone {since}): {in_words(found, label)}."
+        text = f"What the valve differed by is gone {since}: {in_words(found, label)}."
     return _verdict(found, text + (f" It is mended since {onset.mended}." if onset.mended else ""))
 
 
@@ -158,7 +158,7 @@ def pictures(heard: Monitored) -> list[Picture]:
     axes.set_xticks(list(named), [Path(drives[k]).stem for k in named], rotation=30, ha="right")
     axes.axhline(1.0, color="0.4", linewidth=0.8, linestyle="--")
     axes.set_ylabel("gap [noise deviations]")
-    axes.legend(frameon=False)
+    figure.legend(loc="outside upper left", ncols=2, frameon=False)
     caption = "Gap between the model and each drive; dashed: what noise alone leaves."
     return [Picture(figure=figure, caption=caption)]
 
