@@ -272,7 +272,7 @@ class Journal:
         self.path = path
         self._found: dict[str, Any] = {}
         header = json.dumps({"format": JOURNAL, "subject": subject}, sort_keys=True)
-        content = read_bytes(path) if path.exists() else b""
+        content = read_bytes(path) if path.exists() or path.is_symlink() else b""
         complete = content[: content.rfind(b"\n") + 1]  # the last line of a killed run may be torn
         if content:
             self._check_subject(complete.partition(b"\n")[0], json.loads(header), remedy)

@@ -114,6 +114,7 @@ def read_log(folder: str | PathLike[str], rules: RecordingRules = RULES) -> Log:
     for path, own in columns.items():
         for name in ("U_supply_V", "p1_bar", "p2_bar", "p3_bar", "I_A"):
             check_range(Place(file=str(path)), name, own[name], rules.sensors[name.split("_")[0]])
+        check_range(Place(file=str(path)), "target_bar", own["target_bar"], rules.sensors["p2"])
     _check_reference(Path(folder), list(columns.values()), period, pressure / BAR)
     return Log(
         name=manifest.name,

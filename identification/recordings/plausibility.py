@@ -263,7 +263,8 @@ def _check_venting(
     discharges = _discharges(p3, on, ambient)
     if not on[0] or not discharges:
         return
-    slopes = [np.polyfit(np.arange(len(p3[d])), np.log(p3[d]), 1)[0] for d in discharges]
+    falling = [np.log(np.maximum(p3[d], 1e-3)) for d in discharges]  # a wild reading may be negative
+    slopes = [np.polyfit(np.arange(len(own)), own, 1)[0] for own in falling]
     rate, (least, greatest) = float(np.median(slopes)) / -period, rules.venting_rates
     if least <= rate <= greatest:
         return
