@@ -51,9 +51,10 @@ def check(plant: GreyBox) -> list[str]:
     """
     check_description(plant)
     usable = prepared(plant)
-    _refuse(_output_faults(usable))
+    nominal = _simulated(usable, [{}])
+    _refuse(_output_faults(usable, nominal))
     _refuse(_shape_faults(usable))
-    return [*sentences(usable.screened), *_silent_channels(usable), *_effect_warnings(usable)]
+    return [*sentences(usable.screened), *_silent_channels(usable, nominal), *_effect_warnings(usable)]
 
 
 def _refuse(faults: Iterable[str]) -> None:
@@ -254,10 +255,13 @@ def _simulated(plant: GreyBox, changes: Sequence[Mapping[str, float]]) -> list[N
     return outputs
 
 
-def _output_faults(plant: GreyBox) -> Iterator[str]:
-    """Runs that the nominal candidate cannot simulate, or that depend on the candidate beside it."""
-    alone, beside = _simulated(plant, [{}]), _simulated(plant, [{}, next(iter(_trials(plant).values()))])
-    for run, one, two in zip(plant.runs, alone, beside, strict=True):
+def _output_faults(plant: GreyBox, nominal: Sequence[NDArray]) -> Iterator[str]:
+    """Runs that the nominal candidate cannot simulate, or that depend on the candidate beside it.
+
+    nominal: its outputs alone, a run each.
+    """
+    beside = _simulated(plant, [{}, next(iter(_trials(plant).values()))])
+    for run, one, two in zip(plant.runs, nominal, beside, strict=True):
         wrong = np.argwhere(run.trusted & ~np.isfinite(one[..., 0]))
         error = np.abs(two[..., 0] - one[..., 0]) / _magnitudes(one)[:, None]
         if len(wrong):
@@ -294,9 +298,12 @@ def _shape_faults(plant: GreyBox) -> Iterator[str]:
             yield f"forced: equation {equation.name} has the shape {shape}, not {expected}"
 
 
-def _silent_channels(plant: GreyBox) -> Iterator[str]:
-    """Channels that show their noise about one value in all runs, although the nominal model moves."""
-    outputs = [run[..., 0] for run in _simulated(plant, [{}])]
+def _silent_channels(plant: GreyBox, nominal: Sequence[NDArray]) -> Iterator[str]:
+    """Channels that show their noise about one value in all runs, although the nominal model moves.
+
+    nominal: its outputs, a run each.
+    """
+    outputs = [run[..., 0] for run in nominal]
     readings = [run.measured for run in plant.runs]
     for c, channel in enumerate(plant.channels):
         measured, modelled = (
