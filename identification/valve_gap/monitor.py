@@ -61,7 +61,4 @@ def monitor_log(
 
 def gain_in(valve: LoggedValve, known: bool) -> float:
     """By how much a change betters the nominal plant [tolerated misfits]; known: of `gain_by_change`."""
-    first, count = predicted(valve, FitCache(valve)), len(valve.drives)
-    return gain_by_change(
-        first.runs, first.signatures, first.drives, count, first.readings, valve.lasting, known
-    )
+    return gain_by_change(predicted(valve, FitCache(valve)), known)

@@ -2,14 +2,13 @@
 
 from collections.abc import Mapping, Sequence
 from copy import copy
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import combinations
 from os import PathLike
 from pathlib import Path
 from time import perf_counter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from epv_env.common.command_line import NextStep
 from epv_env.common.files import Journal
@@ -23,7 +22,7 @@ from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.judge.verdict import AMBIGUOUS, UNKNOWN
 from identification.gap.prepare.prepared_plant import prepared
 from identification.gap.report.gap_json import write_results
-from identification.gap.search.onset import Span, likeliest_span, spans_of_causes
+from identification.gap.search.onset import LinearisedLog, Span, likeliest_span, spans_of_causes
 from identification.gap.search.screening import CauseSignature, simulate_signatures
 from identification.gap.search.separability import assess_separability
 from identification.recordings.openings import drive_of
@@ -84,35 +83,21 @@ def next_step(verdict: str, folder: Path, out: Path, plant: Path | None) -> Next
     return after_diagnosis(verdict, folder, out, plant)
 
 
-@dataclass(frozen=True)
-class Prediction:
-    """What each cause would change in the fitted recordings of a log, by linear prediction."""
-
-    runs: Sequence[LinearisedRun]
-    """The recalibrated model without a cause."""
-    signatures: Sequence[CauseSignature]
-    """Of the causes beside it."""
-    drives: NDArray
-    """Number of each run's drive, (runs,)."""
-    readings: int
-
-
-def predicted(valve: LoggedValve, cache: FitCache) -> Prediction:
+def predicted(valve: LoggedValve, cache: FitCache) -> LinearisedLog:
     """The first step of the diagnosis of a log."""
     problem, base = recalibrated_by_seen_noise(prepared(valve), cache)
     runs = linearise(problem, [base], problem.fitted_runs)[0]
     signatures = simulate_signatures(problem, base, problem.plant.causes)
     drives = [drive_of(problem.plant.runs[r].name) for r in problem.fitted_runs]
     numbers = np.array([valve.drives.index(drive) for drive in drives])
-    return Prediction(runs, signatures, numbers, problem.readings)
+    count = len(valve.drives)
+    return LinearisedLog(runs, signatures, numbers, count, problem.readings, valve.lasting)
 
 
 def _in_its_drives(valve: LoggedValve, seed: int, cache: FitCache) -> Diagnosis:
     """The diagnosis with each cause acting in its most probable drives."""
     first = predicted(valve, cache)
-    spans = spans_of_causes(
-        first.runs, first.signatures, first.drives, len(valve.drives), first.readings, valve.lasting
-    )
+    spans = spans_of_causes(first)
     found = diagnose(valve.acting_in(spans), seed=seed, cache=cache)
     if found.best and len(found.best.hypothesis.labels) == 1:
         (label,) = found.best.hypothesis.labels

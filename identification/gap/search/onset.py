@@ -61,38 +61,43 @@ class Span:
         return Onset(drives[self.first], self.probability, mended, earliest, latest)
 
 
-def spans_of_causes(
-    runs: Sequence[LinearisedRun],
-    signatures: Sequence[CauseSignature],
-    drives: NDArray,
-    count: int,
-    readings: int,
-    lasting: Collection[str] = (),
-) -> dict[str, Span]:
+@dataclass(frozen=True)
+class LinearisedLog:
+    """What each cause would change in the recordings of a log, by linear prediction."""
+
+    runs: Sequence[LinearisedRun]
+    """The model without a cause, linearised."""
+    signatures: Sequence[CauseSignature]
+    """Of the causes beside it."""
+    drives: NDArray
+    """Number of each run's drive, (runs,)."""
+    count: int
+    """Of drives."""
+    readings: int
+    """How many the runs have."""
+    lasting: Collection[str] = ()
+    """Labels of causes that act in all drives."""
+
+
+def spans_of_causes(log: LinearisedLog) -> dict[str, Span]:
     """The most probable drives of each cause by its label, by linear prediction.
 
     Each cause alone; where the best one leaves more than the tolerated misfit, those that are worse by
     more than that beside it: alone they do not count.
-
-    Args:
-        runs: the model without a cause, linearised.
-        signatures: of the causes beside it.
-        drives: number of each run's drive, (runs,).
-        count: of drives.
-        readings: how many the runs have.
-        lasting: labels of causes that act in all drives.
     """
-    spans = [s for s in combinations(range(count + 1), 2) if np.any(in_span(drives, *s))]
-    acting = np.array([in_span(drives, *span) for span in spans])
-    excluded = np.outer([s.cause.label in lasting for s in signatures], [s != (0, count) for s in spans])
-    squares = np.where(excluded, np.inf, least_squares_by_span(runs, signatures, acting))
+    signatures, readings = log.signatures, log.readings
+    spans = [s for s in combinations(range(log.count + 1), 2) if np.any(in_span(log.drives, *s))]
+    acting = np.array([in_span(log.drives, *span) for span in spans])
+    lasting = [s.cause.label in log.lasting for s in signatures]
+    excluded = np.outer(lasting, [s != (0, log.count) for s in spans])
+    squares = np.where(excluded, np.inf, least_squares_by_span(log.runs, signatures, acting))
     first, at = (int(place) for place in np.unravel_index(np.argmin(squares), squares.shape))
-    found = _likeliest(signatures, squares, spans, count, readings)
+    found = _likeliest(signatures, squares, spans, log.count, readings)
     tolerated = 2.0 * tolerated_misfit(readings)
     if np.min(squares) > readings + tolerated:
-        beside = least_squares_by_span(runs, signatures, acting, (signatures[first], acting[at]))
+        beside = least_squares_by_span(log.runs, signatures, acting, (signatures[first], acting[at]))
         beside = np.where(excluded, np.inf, beside)
-        second = _likeliest(signatures, beside, spans, count, readings)
+        second = _likeliest(signatures, beside, spans, log.count, readings)
         least = np.min(squares, axis=1)
         near = {
             s.cause.label
@@ -103,30 +108,23 @@ def spans_of_causes(
     return found
 
 
-def gain_by_change(
-    runs: Sequence[LinearisedRun],
-    signatures: Sequence[CauseSignature],
-    drives: NDArray,
-    count: int,
-    readings: int,
-    lasting: Collection[str] = (),
-    known: bool = False,
-) -> float:
+def gain_by_change(log: LinearisedLog, known: bool = False) -> float:
     """By how much causes that act in some drives better what acts in all [tolerated misfits].
 
     By linear prediction: one of them beside the best that acts in all. 1 may be chance. known: what acts
-    in all drives counts as a change, too. Further arguments: of `spans_of_causes`.
+    in all drives counts as a change, too.
     """
-    spans = [span for span in combinations(range(count + 1), 2) if span != (0, count)]
-    acting = np.array([in_span(drives, *span) for span in spans])
-    everywhere = np.ones(len(drives), dtype=bool)
-    none, whole = least_squares_by_span(runs, signatures, np.array([~everywhere, everywhere])).T
+    signatures = log.signatures
+    spans = [span for span in combinations(range(log.count + 1), 2) if span != (0, log.count)]
+    acting = np.array([in_span(log.drives, *span) for span in spans])
+    everywhere = np.ones(len(log.drives), dtype=bool)
+    none, whole = least_squares_by_span(log.runs, signatures, np.array([~everywhere, everywhere])).T
     best = int(np.argmin(whole))
-    beside = least_squares_by_span(runs, signatures, acting, (signatures[best], everywhere))
-    beside[[signature.cause.label in lasting for signature in signatures]] = np.inf
+    beside = least_squares_by_span(log.runs, signatures, acting, (signatures[best], everywhere))
+    beside[[signature.cause.label in log.lasting for signature in signatures]] = np.inf
     before = float(none[best] if known else whole[best])
-    misfit = (before / min(float(np.min(beside)), before) - 1.0) * readings / 2.0
-    return misfit / tolerated_misfit(readings)
+    misfit = (before / min(float(np.min(beside)), before) - 1.0) * log.readings / 2.0
+    return misfit / tolerated_misfit(log.readings)
 
 
 def in_span(drives: NDArray, first: int, end: int) -> NDArray:

@@ -19,6 +19,7 @@ from epv_env.plant.plantfile import Plant
 from epv_env.signals import OptionError
 from identification.gap.fit.variable_projection import LinearisedRun
 from identification.gap.search.onset import (
+    LinearisedLog,
     Onset,
     Span,
     gain_by_change,
@@ -137,7 +138,7 @@ def linearised(sizes: dict[str, float]) -> tuple[Any, Any, Any]:
 def test_each_cause_has_its_drives_also_beside_another_one():
     """The first acts in drives 1 and 2 and is mended; the second, smaller one begins in drive 2."""
     sizes = {"first": 3.0, "second": 1.0}
-    spans = spans_of_causes(*linearised(sizes), 4, 480)
+    spans = spans_of_causes(LinearisedLog(*linearised(sizes), 4, 480))
     for label in sizes:
         assert (spans[label].first, spans[label].end) == TRUE[label]
         assert spans[label].probability > 0.9
@@ -151,9 +152,9 @@ def test_each_cause_has_its_drives_also_beside_another_one():
     [({}, False, False), ({"third": 1.0}, False, True), ({"third": 1.0, "second": 1.0}, True, True)],
 )
 def test_what_acts_in_all_drives_is_a_change_of_a_known_valve_alone(sizes, changes, differs):
-    log = (*linearised(sizes), 4, 480)
-    assert (gain_by_change(*log) > 1.0) == changes
-    assert (gain_by_change(*log, known=True) > 1.0) == differs
+    log = LinearisedLog(*linearised(sizes), 4, 480)
+    assert (gain_by_change(log) > 1.0) == changes
+    assert (gain_by_change(log, known=True) > 1.0) == differs
 
 
 def test_of_spans_that_no_opening_tells_apart_the_shortest_is_taken():
