@@ -14,6 +14,7 @@ from safetensors.torch import load, save
 from stable_baselines3 import PPO
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.logger import Logger
+from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.utils import set_random_seed
 from stable_baselines3.common.vec_env import VecEnv
 from tqdm import tqdm
@@ -88,10 +89,10 @@ def linear(first: float, last: float, remaining: float) -> float:
     return last + (first - last) * remaining
 
 
-def make_model(env: VecEnv, *, seed: int) -> PPO:
-    """A new model that begins as the adaptive pulse with some exploration."""
+def make_model(env: VecEnv, *, seed: int, policy: str | type[ActorCriticPolicy] = AdvisedPolicy) -> PPO:
+    """A new model; with the usual policy it begins as the adaptive pulse with some exploration."""
     return PPO(
-        AdvisedPolicy,
+        policy,
         env,
         learning_rate=partial(linear, LEARNING_RATE, LAST_LEARNING_RATE),
         ent_coef=ENTROPY,

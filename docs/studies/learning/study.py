@@ -33,7 +33,7 @@ from training.evaluation.named import named_controllers
 from training.evaluation.rollout import run_episodes
 from training.evaluation.seeds import EVALUATION_SEED
 from training.learners.environment import make_training_env
-from training.learners.ppo import Task, train
+from training.learners.ppo import Task, make_model, train
 
 FOLDER = Path(__file__).parent
 TIMESTEPS, QUICK_TIMESTEPS = 10_000_000, 65_536
@@ -42,13 +42,6 @@ EPISODES, QUICK_EPISODES, DURATION = 1024, 8, 10.0
 """Episodes on which all are judged, under --quick, and their length [s]."""
 PLANTS = "sensitive_ten_percent"
 """Region that the valves are drawn from."""
-NETWORK = {"net_arch": [64, 64]}
-"""As large as that of the package's policy."""
-PPO_SETTINGS: dict[str, Any] = {
-    "learning_rate": lambda remaining: 3e-3 * remaining,
-    "n_steps": 64, "batch_size": 4096, "n_epochs": 2, "gamma": 0.998, "ent_coef": 0.003,
-}  # fmt: skip
-"""Those of `epv train`."""
 DQN_SETTINGS: dict[str, Any] = {
     "learning_rate": 1e-3, "buffer_size": 1_000_000, "learning_starts": 50_000, "batch_size": 4096,
     "train_freq": 1, "gradient_steps": 2, "target_update_interval": 20_000, "gamma": 0.998,
@@ -95,13 +88,15 @@ def readings_alone(env: VectorEnv) -> VectorEnv:
 
 
 def make_ppo(env: VecEnv, seed: int) -> PPO:
-    """stable-baselines3's PPO."""
-    return PPO("MlpPolicy", env, policy_kwargs=NETWORK, seed=seed, device="cpu", **PPO_SETTINGS)
+    """stable-baselines3's PPO with the settings of `epv train`."""
+    return make_model(env, seed=seed, policy="MlpPolicy")
 
 
 def make_dqn(env: VecEnv, seed: int) -> DQN:
     """stable-baselines3's DQN."""
-    return DQN("MlpPolicy", env, policy_kwargs=NETWORK, seed=seed, device="cpu", **DQN_SETTINGS)
+    return DQN(
+        "MlpPolicy", env, policy_kwargs={"net_arch": [64, 64]}, seed=seed, device="cpu", **DQN_SETTINGS
+    )
 
 
 LEARNERS: dict[str, tuple[Callable[[VecEnv, int], BaseAlgorithm], Callable[[VectorEnv], VectorEnv]]] = {
