@@ -160,6 +160,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser = study_parser(__doc__ or "", FOLDER)
     parser.add_argument("--seeds", type=int, default=10, help="trainings of each algorithm")
     options = study_options(parser, arguments)
+    if options.seeds < 1:
+        raise ValueError(f"--seeds {options.seeds} trains nothing: give 1 or more")
     quick, plant = options.quick, load_plant(None)
     timesteps, episodes = (QUICK_TIMESTEPS, QUICK_EPISODES) if quick else (TIMESTEPS, EPISODES)
     options.work.mkdir(parents=True, exist_ok=True)
