@@ -82,7 +82,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = parser.parse_args(arguments)
     cases = sorted(path.parent.name for path in options.round.glob("*/log.json"))
     if not cases:
-        raise ValueError(f"{options.round} holds no logs: give a folder that holds folders with log.json")
+        raise ValueError(f"{options.round} holds no logs: give the folder of a round of logs")
     work = options.out / options.round.name
     journal = Journal(work / "answers.jsonl", {"round": options.round.name, "learn": LEARN})
     for case in progress([case for case in cases if case not in journal], what="logs"):
