@@ -5,7 +5,7 @@ import json
 import os
 import zipfile
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import cloudpickle
 import numpy as np
@@ -22,6 +22,7 @@ from epv_env.observation import ENTRIES
 from epv_env.plant.plantfile import Plant
 from epv_env.reward import RewardWeights
 from training.commands.train import Options, next_step, sentence_of, verdict
+from training.evaluation.scenarios import REFILL_TIME
 from training.learners import ppo, selection
 from training.learners.actor import network_of
 from training.learners.environment import REWARD_SCALE, make_training_env, training_weights
@@ -144,6 +145,14 @@ def test_seeds_are_ranked_by_violations_then_return_and_none_is_trained_twice(tm
     assert trained == [1, 2, 3]
     assert list(table["seed"]) == [3, 2, 1]
     assert list(pd.read_csv(tmp_path / selection.TABLE)["seed"]) == [3, 2, 1]
+
+
+def test_seeds_are_validated_on_empty_control_chambers_with_the_time_of_their_refill(monkeypatch):
+    monkeypatch.setattr(selection, "run_batches", lambda batches, *_, **__: batches)
+    batch = cast(Any, selection.validated(load_policy(), TASK, 8, 10.0))
+    assert batch.options["conditions"].vented > 0
+    assert batch.options["conditions"].braking == 0
+    assert batch.options["settling_time"] == REFILL_TIME
 
 
 @pytest.mark.parametrize(

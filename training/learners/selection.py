@@ -1,10 +1,12 @@
 """Several trainings one after another; the policy that holds the band best is kept.
 
 Seeds train policies that differ in what matters most, how rarely they leave the band. So each is
-validated on many episodes that nothing else uses. The lowest violation rate wins, then the return.
+validated on many episodes that nothing else uses. Some begin with an empty control chamber or have a
+late coil. The lowest violation rate wins, then the return.
 """
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -16,11 +18,16 @@ from epv_env.common.files import Journal, write_text
 from epv_env.plant.plantfile import plant_subject
 from training.evaluation.batches import Batch, run_batches
 from training.evaluation.metrics import EpisodeMetrics, violation_interval
+from training.evaluation.scenarios import REFILL_TIME
 from training.evaluation.seeds import SELECTION_SEED
+from training.learners.environment import CONDITIONS as TRAINED_ON
 from training.learners.ppo import Task, train
 
 EPISODES = 30_000
 """On which each policy is validated."""
+CONDITIONS = replace(TRAINED_ON, braking=0.0, target_steps=0.0)
+"""Of these episodes. Empty control chambers and late coils are as frequent as in training. Steps of the
+target are left out: they are up to half a bar, which alone reaches the end of the band."""
 JOURNAL, TABLE = "seeds.jsonl", "seeds.csv"
 
 
@@ -48,7 +55,8 @@ def train_seeds(
     """
     folder.mkdir(parents=True, exist_ok=True)
     about = {name: repr(value) for name, value in vars(task).items() if name != "plant"}
-    subject = {**plant_subject(task.plant), **about, "episodes": episodes, "duration": duration}
+    about |= {"episodes": episodes, "duration": duration, "conditions": repr(CONDITIONS)}
+    subject = {**plant_subject(task.plant), **about}
     journal, table = Journal(folder / JOURNAL, subject), pd.DataFrame()
     for seed in seeds:
         own = seed_folder(folder, seed)
@@ -67,9 +75,10 @@ def train_seeds(
 
 def validated(policy: Policy, task: Task, episodes: int, duration: float) -> EpisodeMetrics:
     """Figures of the episodes that policies are chosen by."""
+    options = {**vars(task), "conditions": CONDITIONS, "settling_time": REFILL_TIME}
     batch = Batch(
         name="selection", controller="PPO", first_seed=SELECTION_SEED, episodes=episodes,
-        duration=duration, options=vars(task),
+        duration=duration, options=options,
     )  # fmt: skip
     return run_batches([batch], {"PPO": policy}, workers=None, what="validation")[0]
 

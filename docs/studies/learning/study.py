@@ -28,12 +28,13 @@ from epv_env.common.files import Journal, write_text
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from training.evaluation.batches import run_jobs
-from training.evaluation.metrics import summary
 from training.evaluation.named import named_controllers
 from training.evaluation.rollout import run_episodes
+from training.evaluation.scenarios import RANDOM
 from training.evaluation.seeds import EVALUATION_SEED
 from training.learners.environment import make_training_env
 from training.learners.ppo import Task, make_model, train
+from training.studies import comparison
 
 FOLDER = Path(__file__).parent
 TIMESTEPS, QUICK_TIMESTEPS = 10_000_000, 65_536
@@ -56,7 +57,7 @@ COLUMNS = {
     "left_percent": ("violation rate [%]", "{:.3g}"),
     "mean_return": ("return", "{:.0f}"),
     "rms_error_mbar": ("rms error [mbar]", "{:.0f}"),
-    "dip_mbar": ("pressure dip [mbar]", "{:.0f}"),
+    "C2_event_breakdown_mbar": ("pressure dip [mbar]", "{:.0f}"),
     "switchings_per_s": ("switchings [1/s]", "{:.1f}"),
 }
 """Columns of the page's table: heading and format."""
@@ -133,14 +134,9 @@ def judged(make: Callable[[], Controller], episodes: int, plant: Plant) -> dict[
     """Figures of a controller on the episodes that all meet."""
     seeds = range(EVALUATION_SEED, EVALUATION_SEED + episodes)
     options = {"plant": plant, "parameters": PLANTS}
-    found = summary(run_episodes(make(), seeds=seeds, duration=DURATION, options=options))
-    return {
-        "left_percent": 100.0 * (1.0 - found["C1_stayed"]),
-        "mean_return": found["mean_return"],
-        "rms_error_mbar": 1e3 * found["rms_error_bar"],
-        "dip_mbar": 1e3 * found["C2_event_breakdown_bar"],
-        "switchings_per_s": found["switchings_per_s"],
-    }
+    found = run_episodes(make(), seeds=seeds, duration=DURATION, options=options)
+    row = comparison.rows({(PLANTS, RANDOM, ""): found}).iloc[0]
+    return {column: float(row[column]) for column in COLUMNS}
 
 
 def page_table(rows: pd.DataFrame) -> str:
