@@ -7,12 +7,15 @@ adaptive pulse (controllers/pulse.py). Two rules keep the coil on, whatever the 
    stood open would let p2 follow a refill of the supply far above the target.
 2. p2 might rise too far: if the valve opened early, p2 would pass the target by more than CEILING.
 
-Two shields in front of the policy turn what an ordinary episode shows into what no reading can change:
+Three shields stand in front of the policy. Two turn what an ordinary episode shows into what no reading
+can change, the third is for a valve that was off:
 
 3. p2 as read lies above the band: coil on. It stands in front of whatever decides, the controller that
    takes over where sensors fail included.
 4. p2 as read lies below the band, the supply is high and nothing is under way, since the coil is on and
    the control chamber full: coil off, unless a rule above says on. One period off cannot open the valve.
+5. The first reading shows an empty control chamber: coil on for SHUTTING, whatever decides. The valve is
+   open and nothing is known of it, and only consumption takes back what p2 rises too far.
 
 A policy's file names the rules it was trained behind. The shields take no part in a training.
 """
@@ -39,7 +42,10 @@ CEILING = 0.2
 """p2 - target that a pulse may reach if the valve opens early [bar]."""
 RULES = ("supply cannot raise p2: coil on", "early opening would raise p2 too far: coil on")
 """The rules in front of a policy, as its file names them."""
-SHIELDS = ("p2 above the band: coil on", "p2 below the band and nothing under way: coil off")
+SHIELDS = (
+    "p2 above the band: coil on", "p2 below the band and nothing under way: coil off",
+    "control chamber empty at first: coil on for 50 ms",
+)  # fmt: skip
 """What stands in front of every policy beside its rules."""
 HIGH_HEAD, FULL = 1.0, 0.5
 """p1 - p2 from which the supply is high, and p1 - p3 up to which the control chamber is full [bar]."""
@@ -86,7 +92,7 @@ def below_band(v, error):
 def forced(v, error):
     """What rules and shields force for p2 - target as read [bar]: 1 coil on, -1 coil off, 0 nothing;
     2 coil on, whatever decides."""
-    if above_band(error):
+    if above_band(error) or v.found_open > 0:
         return 2.0
     if keeps_on(v):
         return 1.0

@@ -51,6 +51,9 @@ CONTRADICTED = 0.1
 PACE_SPREAD, PACE_DRIFT, PACE_READING_ERROR = 0.2, 1e-3, 0.01
 """Standard deviations of the venting rate's factor before the first reading, of its growth with each
 reading, and of p3 over p3 of a reading [1]."""
+EMPTY, SHUTTING = 2.0, 0.05
+"""p3 below which the coil has been off for longer than any pulse [bar]; time with the coil on that shuts
+the valve then [s]."""
 PERIODS_AFTER_RELEASE = 3
 """Periods with the coil off from which p3 falls at its full rate: the armature has moved."""
 CONFIDENCE, UNKNOWN_CONFIDENCE = 0.95, 0.99
@@ -70,8 +73,8 @@ FILTER_TIME = 0.025
 """Time in which the weight of a reading of p2 fades by 1/e [s]."""
 
 _STATE = (
-    "begun", "plant", "off_periods", "on_periods", "was_shut", "slope", "pace_variance", "measuring",
-    "end_p1", "end_p2", "end_p3", "end_fall", "reached",
+    "begun", "plant", "found_open", "off_periods", "on_periods", "was_shut", "slope", "pace_variance",
+    "measuring", "end_p1", "end_p2", "end_p3", "end_fall", "reached",
 )  # fmt: skip
 
 
@@ -114,7 +117,7 @@ VALVE = np.dtype((np.record,
     + [(name, np.float64, (MEMBERS,)) for name in ("probability", "member_gain", "member_variance")]
 ))  # fmt: skip
 """State of a learner and what it knows of one valve; zeros: an episode begins. plant: its place in
-the table."""
+the table. found_open: 1 until a valve that was open at first has been shut."""
 
 
 @compiled
@@ -276,6 +279,15 @@ def remember_breakdown(v, period):
 
 
 @compiled
+def follow_start(v, r, period):
+    """Keep whether the first reading shows an empty control chamber, until the valve is shut."""
+    if v.off_periods + v.on_periods == 0:
+        v.found_open = 1.0 if r.p3 < EMPTY else 0.0
+    elif (v.on_periods + 1) * period > SHUTTING - period / 2:
+        v.found_open = 0.0
+
+
+@compiled
 def follow_coil(v, on):
     """Count the periods since the last switching; what was read when a pulse ended is kept."""
     if on and v.off_periods > 0:  # at the last reading
@@ -313,6 +325,7 @@ def observe(
     if v.begun == 0:
         begin(v, informed)
     on = r.coil > 0.5
+    follow_start(v, r, period)
     follow_coil(v, on)
     if v.off_periods > 1 and not informed:
         watch_opening(v, table, t, r.p1, r.p2, r.p3, r.p2_change[0] - min(v.slope, 0.0) * period)

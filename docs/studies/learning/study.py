@@ -169,7 +169,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         makers[ORACLE, 0] = partial(reference, ORACLE, plant)
     jobs = {f"{n}, {seed}": partial(judged, make, episodes, plant) for (n, seed), make in makers.items()}
     journal = Journal(options.work / "learning.jsonl", {"timesteps": timesteps, "episodes": episodes})
-    found = run_jobs(jobs, journal=journal, workers=1, what="learning")
+    found = run_jobs(jobs, journal=journal, workers=None, what="learning")
     rows = pd.DataFrame(
         {"controller": name, "seed": seed, **row}
         for (name, seed), row in zip(makers, found, strict=True)

@@ -10,6 +10,7 @@ import shutil
 import sys
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -36,6 +37,7 @@ from identification.recordings.log_files import read_log
 from identification.recordings.openings import drive_of, openings
 from identification.valve_gap.operation import diagnose_log
 from training.drives import write_log
+from training.evaluation.batches import run_jobs
 
 FOLDER = Path(__file__).parent
 SEED = 4931
@@ -169,14 +171,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     numbers, drives = ([2], QUICK) if options.quick else (range(options.valves), DRIVES)
     effects, policy = [effect.name for effect in EFFECTS], policy_digest(TRAINED)
     subject = {"seed": SEED, "drives": drives, "effects": effects, "policy": policy}
-    journal, answers = Journal(options.work / "valves.jsonl", subject), []
-    for number in numbers:
-        if str(number) not in journal:
-            journal.add(str(number), answer(drawn(number, drives), options.work / str(number)))
-            print(number, journal[str(number)], flush=True)
-        answers.append(journal[str(number)])
-        write_bytes(options.out / journal.path.name, read_bytes(journal.path))
-        fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
+    journal = Journal(options.work / "valves.jsonl", subject)
+    jobs = {str(n): partial(answer, drawn(n, drives), options.work / str(n)) for n in numbers}
+    answers = run_jobs(jobs, journal=journal, workers=None, what="logs")
+    write_bytes(options.out / journal.path.name, read_bytes(journal.path))
+    fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
     return 0
 
 

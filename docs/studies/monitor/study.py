@@ -26,7 +26,6 @@ from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from docs.studies.logs.study import deviate
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, digest, read_bytes, write_bytes
-from epv_env.common.results_folder import progress
 from epv_env.plant.effects.coil import COPPER
 from epv_env.plant.effects.record import Size
 from epv_env.plant.effects.registry import EFFECTS
@@ -37,6 +36,7 @@ from epv_env.plant.valves import Valves
 from identification.monitor.model import RETURN, SHIPPED, MonitorModel
 from identification.monitor.monitor import CONFIRMED, Monitor
 from training.drives import DRIVE, drives
+from training.evaluation.batches import run_jobs
 
 FOLDER = Path(__file__).parent
 SEED = 4977
@@ -225,13 +225,12 @@ def told(results: Sequence[dict[str, Any]]) -> str:
 
 
 def alarm_rows(journal: Journal, runs: dict[str, int]) -> list[list[str]]:
-    """Of each kind of log and controller: hours so far, false alarms, the 95 % bound, and causes."""
+    """Of each kind of log and controller: hours, false alarms, the 95 % bound, and causes."""
     rows = []
     for soil, count in runs.items():
         for kind in KINDS:
-            names = [f"unchanged {number}, {soil}, {kind}" for number in range(count)]
-            own = [journal[name] for name in names if name in journal]
-            rows += [[soil, kind, *alarm_cells(own)]] if own else []
+            own = [journal[f"unchanged {number}, {soil}, {kind}"] for number in range(count)]
+            rows.append([soil, kind, *alarm_cells(own)])
     return rows
 
 
@@ -266,15 +265,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     model = digest(read_bytes(SHIPPED))
     subject = {"model": model, "seed": SEED, "changed": changed, "unchanged": unchanged}
     journal = Journal(options.work / "results.jsonl", subject)
-    missing = {
-        name: task
-        for name, task in tasks(MonitorModel.load(SHIPPED), runs, changed, unchanged).items()
-        if name not in journal
-    }
-    for name in progress(missing, what="monitor"):
-        journal.add(name, missing[name]())
-        if not name.startswith("changes"):  # what there is of the hours, so far
-            report(journal, runs, options.out / PAGE)
+    jobs = tasks(MonitorModel.load(SHIPPED), runs, changed, unchanged)
+    run_jobs(jobs, journal=journal, workers=None, what="monitor")
     report(journal, runs, options.out / PAGE)
     write_bytes(options.out / journal.path.name, read_bytes(journal.path))
     return 0
