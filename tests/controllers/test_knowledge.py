@@ -11,6 +11,7 @@ from controllers.knowledge import (
     above_band,
     below_band,
     cannot_raise,
+    forced,
     with_rules,
     would_rise_too_far,
 )
@@ -34,7 +35,7 @@ def valve(**known: float):
 
 
 def test_rules_hold_where_they_should_and_nowhere_else():
-    """A supply that cannot raise p2; an early opening that would raise it too far; shields 3 and 4."""
+    """A supply that cannot raise p2; an early opening that would raise it too far; shields 3 to 5."""
     assert cannot_raise(valve(head=0.1))
     assert not cannot_raise(valve(head=1.0))
     assert would_rise_too_far(valve(error=0.0, after_period_early=0.25))
@@ -47,6 +48,8 @@ def test_rules_hold_where_they_should_and_nowhere_else():
     assert not below_band(valve(**full), -0.49)
     for change in ({"on": 0.0}, {"head": 0.9}, {"p3": 8.4}):  # a pulse, a low supply, one under way
         assert not below_band(valve(**full | change), -0.5)
+    assert forced(valve(**full), -0.5) == -1
+    assert forced(valve(**full, found_open=1.0), -0.5) == 2
 
 
 class Off:

@@ -5,7 +5,7 @@ import numpy as np
 from controllers.knowledge import ValveKnowledge, forced, keeps_on
 from controllers.policy import load_policy
 from controllers.valve_learner import LEARNT
-from epv_env.observation import INDEX, LAYOUT, LIMIT, decode
+from epv_env.observation import INDEX, LAYOUT, LIMIT, decode, encode
 from epv_env.plant.plantfile import Plant
 
 
@@ -37,7 +37,7 @@ def test_no_reading_opens_above_the_band_or_keeps_shut_below_it_and_without_shie
         seen = random_observations(500, rng)
         above, below = outside(seen)
         off, on = controller.network.logits(knowledge.observe(seen)).T
-        ruled = np.array([keeps_on(v) for v in knowledge.valves])
+        ruled = np.array([keeps_on(v) or v.found_open > 0 for v in knowledge.valves])
         bare = np.where(ruled | ~(off >= on), 1, 0)
         forces = np.array(
             [
@@ -58,6 +58,20 @@ def test_no_reading_opens_above_the_band_or_keeps_shut_below_it_and_without_shie
         error = decode(seen, "p2_error")
         assert np.all(actions[(error >= 0.5) & np.isfinite(error + decode(seen, "target"))] == 1)
     assert min(without.values()) > 0
+
+
+def test_a_valve_that_is_found_open_is_shut_for_as_long_as_that_takes_and_another_is_not():
+    controller = load_policy()
+    usual = {entry.name: np.full(2, entry.centre) for entry in LAYOUT}
+    usual |= {"p1": np.full(2, 11.0), "target": np.full(2, 8.0), "p2_error": np.full(2, -3.5)}
+    usual |= {"p3": np.array([1.0, 11.0])}
+    controller.reset(2)
+    coil, taken = np.array([0.0, 1.0]), []
+    for _ in range(12):
+        coil = controller.act(encode(usual | {"action": coil}))
+        taken.append(coil)
+    assert [found for found, _ in taken] == 10 * [1] + [0, 0]
+    assert taken[0][1] == 0
 
 
 def test_no_input_of_the_box_makes_a_logit_that_is_no_number():
