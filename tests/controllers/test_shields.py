@@ -37,7 +37,7 @@ def test_no_reading_opens_above_the_band_or_keeps_shut_below_it_and_without_shie
         seen = random_observations(500, rng)
         above, below = outside(seen)
         off, on = controller.network.logits(knowledge.observe(seen)).T
-        ruled = np.array([keeps_on(v) or v.found_open > 0 for v in knowledge.valves])
+        ruled = np.array([keeps_on(v) for v in knowledge.valves]) | (knowledge.valves["found_open"] > 0)
         bare = np.where(ruled | ~(off >= on), 1, 0)
         forces = np.array(
             [
