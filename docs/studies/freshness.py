@@ -31,7 +31,7 @@ STUDIES: dict[str, tuple[float, tuple[str, ...]]] = {
     "blind": (80, ("study --trials 100 --seed 5044", "study --trials 100 --seed 5045 --forms strong")),
     "logs": (90, ("study --valves 60",)),
     "sim_to_real": (120, ("study --seeds 3",)),
-    "comparison": (60, ("study",)),
+    "comparison": (20, ("study",)),
 }
 """Rough minutes on two cores, and the modules that make the published tables, with their options."""
 PACKAGES = ("epv_env", "controllers", "identification", "training")
