@@ -14,12 +14,15 @@ from controllers.tuned import tuned
 from docs.studies.common import PAGE
 from docs.studies.comparison import study as comparison
 from docs.studies.sim_to_real import study as sim_to_real
+from epv_env.common.files import write_json
 from epv_env.plant.effects.registry import CATALOGUE
 from epv_env.plant.parameters import Parameters
 from epv_env.plant.plantfile import Plant, load_plant, save_plant
 from epv_env.plant.region import Alternative, Mixture, Region
 from identification.bench.session import run_programme
 from identification.commands import gap
+from identification.gap.report.gap_json import FORMAT
+from identification.recordings.campaign_files import read_campaign
 from training.commands import sim_to_real as command
 from training.evaluation.rollout import run_episodes
 
@@ -27,7 +30,10 @@ pytestmark = [pytest.mark.training, pytest.mark.slow]
 
 
 def test_the_comparison(tmp_path, monkeypatch):
-    monkeypatch.setattr(comparison, "CONTROLLERS", ("adaptive pulse", "extrapolating hysteresis"))
+    both = ("adaptive pulse", "extrapolating hysteresis")
+    monkeypatch.setattr(comparison, "CONTROLLERS", both)
+    few = {"beyond": (4, both), "faults": (4, both[:1]), "worn": (4, both)}
+    monkeypatch.setattr(comparison, "GROUPS", few)
     assert comparison.main(["--quick", "--out", str(tmp_path)]) == 0
     names = {"comparison.csv", "differences.csv", "beyond.csv", "comparison.png", PAGE}
     assert names <= {path.name for path in tmp_path.iterdir()}
@@ -41,8 +47,12 @@ def test_the_loop(tmp_path, monkeypatch):
     def diagnosed(options):
         true = load_plant(options.campaign.parent / sim_to_real.WITHHELD)
         answer = Alternative(name="piston_friction", probability=1.0, region=true.region)
-        save_plant(replace(true, diagnosis=Mixture(alternatives=(answer,))), options.out / "plant.json")
-        (options.out / "gap.json").write_text('{"verdict": "known"}')
+        recordings = read_campaign(options.campaign).recordings
+        about = {"recordings_sha256": {r.name: r.sha256 for r in recordings if r.role != "quality"}}
+        found = replace(true, diagnosis=Mixture(alternatives=(answer,)), provenance=about)
+        save_plant(found, options.out / "plant.json")
+        said = {"format": FORMAT, "verdict": "known", "causes": [], "ambiguity_set": [], "gap": {}}
+        write_json(options.out / "gap.json", said, allow_nan=False)
 
     def trained(folder, *plants, **options):
         shutil.copytree(TRAINED, folder, dirs_exist_ok=True)
