@@ -122,9 +122,9 @@ def soiled(drive: NDArray, rng: np.random.Generator) -> Iterator[NDArray]:
 
 def alarms_of(monitor: Monitor) -> int:
     """How often an alarm began: the statistic has passed the threshold, and still does."""
-    over = np.array([log_odds > 0.0 for _, log_odds in monitor.history])
-    alarms = np.lib.stride_tricks.sliding_window_view(over, CONFIRMED).all(axis=1)
-    return int(np.sum(np.diff(alarms.astype(int), prepend=0) > 0))
+    over = [log_odds > 0.0 for _, log_odds in monitor.history]
+    alarms = [all(over[end - CONFIRMED : end]) for end in range(CONFIRMED, len(over) + 1)]
+    return int(np.sum(np.diff(np.array(alarms, dtype=int), prepend=0) > 0))
 
 
 def false_alarms(
