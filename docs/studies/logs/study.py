@@ -173,6 +173,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     subject = {"seed": SEED, "drives": drives, "effects": effects, "policy": policy}
     journal = Journal(options.work / "valves.jsonl", subject)
     jobs = {str(n): partial(answer, drawn(n, drives), options.work / str(n)) for n in numbers}
+    # One process: `set_sizes` of this module, which is run as a script, cannot be sent to another.
     answers = run_jobs(jobs, journal=journal, workers=1, what="logs")
     write_bytes(options.out / journal.path.name, read_bytes(journal.path))
     fill(options.out / PAGE, {"figures": table(["", "Number"], rows(answers))})
