@@ -175,7 +175,7 @@ def deployment_contract(export: Export) -> dict[str, Any]:
         "actions": {"0": "coil off: the protection valve opens", "1": "coil on: it shuts"},
         "decision": "1 if a rule says so; else 0 if the logit of off is at least that of on, else 1; "
         "where p3 is implausible or readings are lost, a hysteresis that does not read p3 decides, and "
-        "of the rules the shields that keep the coil on remain",
+        "of rules and shields those shields remain that keep the coil on",
         "timing": "read, decide and switch at each period's start; the coil stays so through it. Time "
         "counts in calls: called more often, waits end early and the learnt rates are wrong; jitter of "
         "a call shifts its readings. The stated agreement holds for the period alone",

@@ -1,6 +1,6 @@
 """Several trainings one after another; the policy that holds the band best is kept.
 
-Seeds train policies that differ in what matters most, how rarely they leave the band. So each is
+Seeds may train policies that differ in what matters most, how rarely they leave the band. Each is
 validated on many episodes that nothing else uses. Some begin with an empty control chamber or have a
 late coil. The lowest violation rate wins, then the return.
 """
