@@ -25,6 +25,7 @@ from controllers.policy import load_policy
 from docs.studies.common import PAGE, fill, study_options, study_parser, table
 from epv_env.common.command_line import fail_clearly
 from epv_env.common.files import Journal, write_text
+from epv_env.common.options import COUNT
 from epv_env.plant.plantfile import Plant, load_plant
 from epv_env.reward import RewardWeights
 from training.evaluation.batches import run_jobs
@@ -154,10 +155,8 @@ def page_table(rows: pd.DataFrame) -> str:
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the study; returns the exit status."""
     parser = study_parser(__doc__ or "", FOLDER)
-    parser.add_argument("--seeds", type=int, default=10, help="trainings of each algorithm")
+    parser.add_argument("--seeds", type=COUNT, default=10, help="trainings of each algorithm")
     options = study_options(parser, arguments)
-    if options.seeds < 1:
-        raise ValueError(f"--seeds {options.seeds} trains nothing: give 1 or more")
     quick, plant = options.quick, load_plant(None)
     timesteps, episodes = (QUICK_TIMESTEPS, QUICK_EPISODES) if quick else (TIMESTEPS, EPISODES)
     options.work.mkdir(parents=True, exist_ok=True)
